@@ -1,0 +1,77 @@
+"""Output files that appear whole or not at all, and replace nothing unless asked."""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from iccbrdf.errors import LimitError, UsageError
+
+StrPath = str | os.PathLike[str]
+
+_NO_SPACE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+
+
+def check_target(path: StrPath, *, overwrite: bool = False) -> Path:
+    """The real path of an output file, after the checks that can be made before any work is done.
+
+    Links are followed, so that replacing a linked file leaves the link in place.
+
+    Raises
+    ------
+    UsageError
+        The file exists and `overwrite` is not set, its folder does not exist, or it is no regular file.
+    """
+    target = Path(os.path.realpath(path))
+    if not target.parent.is_dir():
+        raise UsageError(f"{path}: cannot be written: the folder {target.parent} does not exist")
+    if target.exists():
+        if not target.is_file():
+            raise UsageError(f"{path}: cannot be written: it is not a regular file")
+        if not overwrite:
+            raise UsageError(f"{path}: exists already; choose another name, or ask for overwriting (--force)")
+    return target
+
+
+@contextmanager
+def atomic_output(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
+    """Give a temporary path to write to, which becomes `path` when the block ends without an exception.
+
+    The temporary file is made (empty) in the folder of `path`, so that the final rename is one step of
+    the file system.  After an exception, a keyboard interrupt included, it is deleted and `path` is as it
+    was before.
+
+    Raises
+    ------
+    UsageError
+        As `check_target`, before the block runs; also when the folder cannot be written to, or when the file
+        came into being meanwhile.
+    LimitError
+        The block ran out of disk space.
+
+    Examples
+    --------
+    >>> with atomic_output("print.icc") as temporary:         # doctest: +SKIP
+    ...     temporary.write_bytes(data)
+    """
+    target = check_target(path, overwrite=overwrite)
+    temporary = target.with_name(f".{secrets.token_hex(8)}.part")
+    try:
+        # Mode "x" applies the user's umask, which tempfile.mkstemp would not.
+        temporary.open("xb").close()
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written: {error.strerror}") from error
+    try:
+        yield temporary
+        check_target(path, overwrite=overwrite)
+        temporary.replace(target)
+    except OSError as error:
+        if error.errno in _NO_SPACE:
+            raise LimitError(f"{path}: cannot be written: {error.strerror}") from error
+        raise
+    finally:
+        temporary.unlink(missing_ok=True)
