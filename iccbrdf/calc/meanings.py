@@ -237,12 +237,12 @@ def solve(values: Sequence[Value], s: int, t: int) -> list[Value]:
     rows, columns = s + 1, t + 1
     dtype = values[0].dtype
     numbers = np.stack(np.broadcast_arrays(*values), axis=-1).astype(np.float64)
-    finite = np.isfinite(numbers).all(axis=-1)
+    finite: Value = np.asarray(np.isfinite(numbers).all(axis=-1))
     numbers = np.where(finite[..., None], numbers, 0.0)
     matrix = numbers[..., : rows * columns].reshape(*numbers.shape[:-1], rows, columns)
     u, sigma, vt = np.linalg.svd(matrix, full_matrices=False)
     tolerance = max(rows, columns) * np.finfo(np.float64).eps * sigma[..., 0]
-    solvable = np.asarray(finite & (sigma[..., -1] > tolerance))
+    solvable: Value = np.asarray(finite & (sigma[..., -1] > tolerance))
     projected = np.einsum("...ij,...i->...j", u, numbers[..., rows * columns :])
     x = np.einsum("...ji,...j->...i", vt, projected / np.where(solvable[..., None], sigma, 1.0))
     x = np.where(solvable[..., None], x, 0.0).astype(dtype)
