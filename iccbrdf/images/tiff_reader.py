@@ -1,0 +1,163 @@
+"""Multichannel TIFF as a stream of blocks whose meaning is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import TracebackType
+
+import numpy as np
+
+from iccbrdf.errors import InputError, UsageError, nearest
+from iccbrdf.files import StrPath
+from iccbrdf.images.blocks import Array, Block
+from iccbrdf.images.record import SAMPLES, U1_15_ONE, Record, Samples, from_description
+from iccbrdf.images.tiff_storage import TiffStorage
+
+
+def open_tiff(path: StrPath, samples: Samples | None = None) -> TiffSource:
+    """Open a TIFF of one image for reading; use it in a `with` statement.
+
+    Parameters
+    ----------
+    path
+        Strips or tiles, interleaved or planar, classic or BigTIFF, compressed or not; 8 and 16-bit unsigned
+        integers, 16, 32 and 64-bit floats; grey, RGB, CMYK or any channels.
+    samples
+        What the samples mean, for a float file that does not say so itself (see `iccbrdf.images.record`):
+        "device" (0..1, the default) or "real" (physical values).  Integers without a record are "device".
+
+    Raises
+    ------
+    InputError
+        The file is missing, is no TIFF or is damaged; or `samples` contradicts what the file says.
+    UnsupportedError
+        Another sample type, photometric interpretation or orientation, or several images in the file.
+    LimitError
+        A compressed segment or the whole image is too large.
+
+    Examples
+    --------
+    >>> with open_tiff("brdf.tif") as source:                 # doctest: +SKIP
+    ...     for y0, x0, data in source.blocks():
+    ...         process(data)
+    """
+    return TiffSource(path, samples)
+
+
+class TiffSource:
+    """An open TIFF.  See `open_tiff`.
+
+    Attributes
+    ----------
+    height, width, channels
+        The size of the image.
+    names
+        The channels' names, where the file has a record of them, else None.
+    dtype
+        The type of the samples in the file (those of the blocks are float32 always).
+    samples
+        "device" or "real".
+    profile
+        The ICC profile embedded in the file (tag 34675), or None.
+    """
+
+    def __init__(self, path: StrPath, samples: Samples | None = None) -> None:
+        if samples is not None and samples not in SAMPLES:
+            raise UsageError(f"{path}: unknown samples {samples!r}: {nearest(samples, SAMPLES)}")
+        self._path = path
+        self._storage = TiffStorage(path)
+        self.height: int = self._storage.height
+        self.width: int = self._storage.width
+        self.channels = self._storage.channels
+        self.dtype = self._storage.dtype
+        self.profile = self._storage.profile
+        try:
+            record = from_description(self._storage.description, path)
+            self._check_meaning(record, samples)
+        except BaseException:
+            self._storage.close()
+            raise
+        is_float = self.dtype.kind == "f"
+        self.names = record.channels if record else None
+        self.samples: Samples = record.samples if record else samples or "device"
+        # What a stored integer is divided by.
+        self._one = 1 if is_float else U1_15_ONE if self.samples == "real" else np.iinfo(self.dtype).max
+        self._must_show = is_float and record is None and samples is None
+
+    def __enter__(self) -> TiffSource:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._storage.close()
+
+    def _check_meaning(self, record: Record | None, declared: Samples | None) -> None:
+        path, is_float = self._path, self.dtype.kind == "f"
+        if record is None:
+            if declared == "real" and not is_float:
+                raise InputError(f"{path}: declared as 'real', but samples of {self.dtype.name} are 'device'")
+            return
+        if declared is not None and declared != record.samples:
+            raise InputError(f"{path}: declared as {declared!r}, but the file says {record.samples!r}")
+        if len(record.channels) != self.channels:
+            raise InputError(
+                f"{path}: the ImageDescription names {len(record.channels)} channels "
+                f"({', '.join(record.channels)}), but the image has {self.channels}"
+            )
+        if record.encoding is None:
+            fits = is_float or record.samples == "device"
+        else:
+            fits = record.samples == "real" and self.dtype.name == "uint16"
+        if not fits:
+            raise InputError(
+                f"{path}: the ImageDescription says {record.samples!r} samples in encoding "
+                f"{record.encoding!r}, which does not go with {self.dtype.name}"
+            )
+
+    def blocks(self, max_pixels: int = 1 << 18) -> Iterator[Block]:
+        """The image as float32 blocks in row order; integers scaled to 0..1 (real XYZ in u1.15 to XYZ).
+
+        Floats come as they are, those that are not finite included.
+
+        Parameters
+        ----------
+        max_pixels
+            Blocks have at most so many pixels, except where a single compressed segment has more.
+
+        Raises
+        ------
+        InputError
+            A segment is damaged; or the meaning of a float file is neither recorded nor declared and a value
+            lies outside 0..1.
+        """
+        unit_height, unit_width = self._storage.unit
+        unit_pixels = unit_height * unit_width
+        columns = unit_width * min(-(-self.width // unit_width), max(1, max_pixels // unit_pixels))
+        rows = unit_height * max(1, max_pixels // (unit_height * columns))
+        for y0 in range(0, self.height, rows):
+            for x0 in range(0, self.width, columns):
+                height, width = min(rows, self.height - y0), min(columns, self.width - x0)
+                stored = self._storage.read(y0, x0, height, width)
+                if self._must_show:
+                    self._check_range(stored, y0, x0)
+                yield Block(y0, x0, self._values(stored))
+
+    def _values(self, stored: Array) -> Array:
+        if self._one != 1:
+            values: Array = np.divide(stored, np.float32(self._one), dtype=np.float32)
+            return values
+        # A float64 beyond float32 becomes infinite, which is passed on like any infinity.
+        with np.errstate(over="ignore"):
+            return stored.astype(np.float32, copy=False)
+
+    def _check_range(self, stored: Array, y0: int, x0: int) -> None:
+        outside = ((stored < 0) | (stored > 1)) & np.isfinite(stored)
+        if outside.any():
+            y, x, channel = np.argwhere(outside)[0]
+            raise InputError(
+                f"{self._path}: row {y0 + y}, column {x0 + x}, channel {channel} is "
+                f"{float(stored[y, x, channel]):.9g}, but device values are in 0..1, and the file does not "
+                "say what its samples mean; if they are physical values as they are, declare it: "
+                "--samples real (samples='real' in Python)"
+            )

@@ -1,0 +1,195 @@
+"""The pixels of a TIFF as they are stored, any rectangle of them.
+
+The parsing of the file and the decoding of compressed segments are tifffile's (with imagecodecs).
+Uncompressed pixels are read from their place, so that even a file in one piece needs no memory for more
+than the rectangle; a compressed segment can only be decoded as a whole, and one that is too large is refused.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import tifffile
+
+from iccbrdf.errors import IccBrdfError, InputError, LimitError, UnsupportedError
+from iccbrdf.files import StrPath
+from iccbrdf.images.blocks import Array, Grid
+
+MAX_SEGMENT_BYTES = 1 << 28
+MAX_SAMPLES = 1 << 40
+MAX_CHANNELS = 256
+
+_DTYPES = ("u1", "u2", "f2", "f4", "f8")
+_PHOTOMETRICS = ("MINISBLACK", "RGB", "SEPARATED")
+
+
+class TiffStorage:
+    """The one image of a TIFF.  Errors as `iccbrdf.images.open_tiff` lists them.
+
+    Attributes
+    ----------
+    height, width, channels
+        The size of the image.
+    dtype
+        The type of the samples, with the byte order of the file.
+    description, profile
+        The ImageDescription ("" without one) and the embedded ICC profile (None without one).
+    unit
+        Height and width of what can only be read together: a compressed segment, or one pixel.
+    """
+
+    def __init__(self, path: StrPath) -> None:
+        self._path = path
+        try:
+            self._file: Any = tifffile.TiffFile(path)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+        # Whatever its parsing of a damaged file runs into leaves tifffile as it is.
+        except Exception as error:
+            raise InputError(f"{path}: not a readable TIFF: {error}") from error
+        try:
+            self._parse()
+        except IccBrdfError:
+            self.close()
+            raise
+        except Exception as error:
+            self.close()
+            raise InputError(f"{path}: damaged TIFF: {error}") from error
+
+    def close(self) -> None:
+        self._file.close()
+
+    def _parse(self) -> None:
+        path = self._path
+        page = self._page = _only_image(self._file, path)
+        self._planes, _, self.height, self.width, contiguous = page.shaped
+        self.channels: int = self._planes * contiguous
+        if self.channels > MAX_CHANNELS:
+            raise LimitError(f"{path}: {self.channels} channels, the limit is {MAX_CHANNELS}")
+        if self.height * self.width * self.channels > MAX_SAMPLES:
+            raise LimitError(
+                f"{path}: {self.height} x {self.width} pixels with {self.channels} channels, "
+                f"the limit is {MAX_SAMPLES} samples"
+            )
+        self.dtype = _sample_type(page, self._file.byteorder, path)
+        self.description: str = page.description
+        self.profile: bytes | None = page.iccprofile
+        self._pixel_bytes = contiguous * self.dtype.itemsize
+        if page.is_tiled:
+            self._grid = Grid(self.height, self.width, page.tilelength, page.tilewidth)
+        else:
+            self._grid = Grid(self.height, self.width, min(page.rowsperstrip, self.height), self.width)
+        self._in_place = page.compression == 1 and page.predictor == 1 and page.fillorder == 1
+        self.unit = (1, 1) if self._in_place else (self._grid.segment_height, self._grid.segment_width)
+        self._offsets: Sequence[int] = page.dataoffsets
+        self._counts: Sequence[int] = page.databytecounts
+        self._check_segments()
+
+    def _check_segments(self) -> None:
+        path, grid = self._path, self._grid
+        expected = self._planes * grid.segments
+        if len(self._offsets) < expected or len(self._counts) < expected:
+            raise InputError(
+                f"{path}: damaged TIFF: {len(self._offsets)} offsets and {len(self._counts)} byte counts, "
+                f"expected {expected} of each"
+            )
+        size = os.path.getsize(path)
+        segment_bytes = grid.segment_height * grid.segment_width * self._pixel_bytes
+        for i in range(expected):
+            offset, count = self._offsets[i], self._counts[i]
+            if offset + count > size:
+                raise InputError(
+                    f"{path}: truncated: segment {i} of {expected} ends at byte {offset + count}, "
+                    f"the file at byte {size}"
+                )
+            if not self._in_place:
+                self._check_size(count, "encoded")
+            elif count:
+                _, _, rows, _ = grid.extent(i % grid.segments)
+                needed = segment_bytes if self._page.is_tiled else rows * self.width * self._pixel_bytes
+                if count < needed:
+                    raise InputError(
+                        f"{path}: damaged TIFF: segment {i} has {count} bytes, expected {needed}"
+                    )
+        if not self._in_place:
+            self._check_size(segment_bytes * self._planes, "decoded, all channels together,")
+
+    def _check_size(self, size: int, what: str) -> None:
+        if size > MAX_SEGMENT_BYTES:
+            raise LimitError(
+                f"{self._path}: a compressed segment of {self.unit[0]} x {self.unit[1]} pixels takes {size} "
+                f"bytes {what} and can only be decoded as a whole; the limit is {MAX_SEGMENT_BYTES}: "
+                "save the file uncompressed, or with smaller strips or tiles"
+            )
+
+    def read(self, y0: int, x0: int, height: int, width: int) -> Array:
+        """A rectangle of pixels, shape (height, width, channels), in the file's sample type."""
+        # Segments that a sparse file leaves out are zero, as other readers have it.
+        pixels = np.zeros((height, width, self.channels), self.dtype)
+        for plane in range(self._planes):
+            target = pixels if self._planes == 1 else pixels[:, :, plane : plane + 1]
+            for part in self._grid.parts(y0, x0, height, width):
+                segment = plane * self._grid.segments + part.segment
+                if self._counts[segment] == 0:
+                    continue
+                if self._in_place:
+                    for start, rows in self._grid.runs(part):
+                        run = target[rows, part.in_region[1]]
+                        data = self._bytes(self._offsets[segment] + start * self._pixel_bytes, run.nbytes)
+                        run[...] = np.frombuffer(data, self.dtype).reshape(run.shape)
+                else:
+                    target[part.in_region] = self._decoded(segment)[part.in_segment]
+        return pixels
+
+    def _bytes(self, offset: int, count: int) -> bytes:
+        self._file.filehandle.seek(offset)
+        data: bytes = self._file.filehandle.read(count)
+        if len(data) != count:
+            raise InputError(f"{self._path}: truncated: no {count} bytes at byte {offset}")
+        return data
+
+    def _decoded(self, segment: int) -> Array:
+        data = self._bytes(self._offsets[segment], self._counts[segment])
+        try:
+            pixels: Array = self._page.decode(data, segment, jpegtables=self._page.jpegtables)[0][0]
+        # Every codec has an exception of its own.
+        except Exception as error:
+            raise InputError(f"{self._path}: segment {segment} cannot be decoded: {error}") from error
+        return pixels
+
+
+def _only_image(file: Any, path: StrPath) -> Any:
+    """The one page of a file that is neither a thumbnail nor another reduction."""
+    pages = [page for page in file.pages if not page.is_reduced]
+    if len(pages) != 1:
+        raise UnsupportedError(
+            f"{path}: holds {len(pages)} images, expected one, with the channels interleaved or planar in it"
+        )
+    page = pages[0]
+    if 0 in page.shaped:
+        raise InputError(f"{path}: the image is empty")
+    if page.shaped[1] != 1:
+        raise UnsupportedError(f"{path}: an image of {page.shaped[1]} slices, expected a flat one")
+    photometric = getattr(page.photometric, "name", page.photometric)
+    if photometric not in _PHOTOMETRICS:
+        raise UnsupportedError(
+            f"{path}: photometric interpretation {photometric}, supported are {', '.join(_PHOTOMETRICS)}"
+        )
+    orientation = page.tags.valueof(274, 1)
+    if orientation != 1:
+        raise UnsupportedError(f"{path}: orientation {orientation}, supported is 1 (first row at the top)")
+    return page
+
+
+def _sample_type(page: Any, byteorder: str, path: StrPath) -> np.dtype[Any]:
+    if page.dtype is not None:
+        dtype: np.dtype[Any] = np.dtype(page.dtype).newbyteorder(byteorder)
+        if dtype.str[1:] in _DTYPES and page.bitspersample == 8 * dtype.itemsize:
+            return dtype
+    raise UnsupportedError(
+        f"{path}: samples of {page.bitspersample} bits, format {getattr(page.sampleformat, 'name', '?')}; "
+        "supported are unsigned integers of 8 and 16 bits and floats of 16, 32 and 64 bits"
+    )
