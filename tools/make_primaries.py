@@ -1,0 +1,149 @@
+"""Make the example primaries files of profiles/ from published tables, so that no figure is typed by hand.
+
+    python tools/make_primaries.py [--data ../shared/data] [-o profiles]
+
+The data folder holds print/FOGRA39L.ti3 (characterisation data of coated offset, CGATS) and painting/ (maps
+of a measured painting: kd, ks and gloss, as PNG).
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from imagecodecs import imread
+from numpy.typing import NDArray
+
+from iccbrdf.brdf.geometry import planar
+from iccbrdf.brdf.models import evaluate
+from iccbrdf.brdf.primaries import Primaries, Primary, write_primaries
+
+ROOT = Path(__file__).resolve().parent.parent
+TWO_DEGREES = "CIE 1931 2 Degree Standard Observer"
+PCS_WHITE = (0.9642, 1.0, 0.8249)
+DIGITS = 6
+
+# Paper, inks, overprints and the two blacks.
+PATCHES = {
+    "White": (0, 0, 0, 0),
+    "C": (100, 0, 0, 0),
+    "M": (0, 100, 0, 0),
+    "Y": (0, 0, 100, 0),
+    "CM": (100, 100, 0, 0),
+    "CY": (100, 0, 100, 0),
+    "MY": (0, 100, 100, 0),
+    "CMY": (100, 100, 100, 0),
+    "K": (0, 0, 0, 100),
+}
+
+# ks and m of Cook-Torrance BRDF1 with n = 1.5, fitted to the gonioreflectometer data of the Cornell Program
+# of Computer Graphics.  ks is that of a white of Y = 1: its colour is the illuminant's.
+GARNET_RED = (0.265, 0.251)
+KRYLON_BLUE = (0.205, 0.213)
+
+FOGRA39_SOURCE = (
+    "Colours: FOGRA39L characterisation data, coated offset, D50, 2 degrees, 45:0 (Fogra, 2006). "
+    "Gloss: ks and m fitted to two paints measured by the Cornell Program of Computer Graphics, garnet red "
+    "(paper and single inks) and krylon true blue (overprints and K, the thicker ink). This pairing is the "
+    "project's own: no goniometric measurement of printed CMYK is public. kd: the XYZ less the gloss at 45:0."
+)
+PAINTING_SOURCE = (
+    "F. Marton, Cape Spartivento Lighthouse, oil on canvas, measured by cnr-isti-vclab (OpenLIME): mean of "
+    "the diffuse, specular and gloss maps over the lightest hundredth. XYZ: the model at 45:0."
+)
+
+
+def make_fogra39_gloss(data: Path) -> Primaries:
+    """Return FOGRA39 colours with the gloss of two paints, so that the model at 45:0 gives the XYZ."""
+    colours = read_colours(data / "print" / "FOGRA39L.ti3")
+    primaries = []
+    for name, cmyk in PATCHES.items():
+        ks, m = KRYLON_BLUE if np.count_nonzero(cmyk) > 1 or name == "K" else GARNET_RED
+        gloss = np.array([*np.multiply(ks, PCS_WHITE), m]).round(DIGITS)
+        black = np.concatenate([np.zeros(3), gloss])
+        kd = np.subtract(colours[cmyk], factor_45_0("brdf1", black)).round(DIGITS)
+        primaries.append(Primary(name, colours[cmyk], (*kd.tolist(), *gloss.tolist()), cmyk))
+    return Primaries(
+        model="brdf1",
+        illuminant="D50",
+        observer=TWO_DEGREES,
+        white=PCS_WHITE,
+        geometry="45:0",
+        source=FOGRA39_SOURCE,
+        primaries=tuple(primaries),
+    )
+
+
+def make_ward_painting(data: Path) -> Primaries:
+    """Return the lightest paint of the painting, in the model that its maps were measured for."""
+    # The maps' borders are invalid.
+    kd, ks, gloss = (
+        imread(data / "painting" / f"{name}map_level2.png")[40:-40, 40:-40].reshape(-1, 3) / 255
+        for name in ("kd", "ks", "gl")
+    )
+    lightest = kd[:, 1] >= np.quantile(kd[:, 1], 0.99)
+    Rd = linear_sRGB_to_XYZ(kd[lightest].mean(axis=0))
+    m = ward_roughness(gloss[lightest, 0]).mean()
+    parameters = np.array([*Rd, ks[lightest].mean(), m]).round(DIGITS)
+    XYZ = factor_45_0("ward", parameters).round(DIGITS)
+    return Primaries(
+        model="ward",
+        illuminant="D65",
+        observer=TWO_DEGREES,
+        white=tuple(linear_sRGB_to_XYZ(np.ones(3)).round(DIGITS).tolist()),
+        geometry="45:0",
+        source=PAINTING_SOURCE,
+        primaries=(Primary("Lightest paint", tuple(XYZ.tolist()), tuple(parameters.tolist())),),
+        encoding={"Rd": 1.25},
+    )
+
+
+def factor_45_0(model: str, parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return XYZ at 45:0 relative to the perfect diffuser in the same light."""
+    flat, light, view = planar(0), planar(-45), planar(0)
+    return evaluate(model, parameters, flat, light, view, intensity=np.pi * np.sqrt(2))
+
+
+def ward_roughness(gloss: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return Ward's m of the painting's gloss map (0..1), by the formula of its viewer, OpenLIME."""
+    least, most = 1 - 0.6**0.25, 1 - 0.05**0.25
+    m: NDArray[np.float64] = (1 - gloss * (most - least) - least) ** 4
+    return m
+
+
+def linear_sRGB_to_XYZ(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return XYZ (D65, Y = 1) of linear sRGB."""
+    import colour
+
+    XYZ: NDArray[np.float64] = colour.models.RGB_COLOURSPACE_sRGB.matrix_RGB_to_XYZ @ rgb
+    return XYZ
+
+
+def read_colours(path: Path) -> dict[tuple[int, ...], tuple[float, ...]]:
+    """Return XYZ (Y = 1) by CMYK in per cent, of a CGATS table."""
+    text = path.read_text(encoding="ascii")
+    names = text.split("BEGIN_DATA_FORMAT")[1].split("END_DATA_FORMAT")[0].split()
+    rows = text.split("BEGIN_DATA\n")[1].split("END_DATA")[0].splitlines()
+    colours = {}
+    for row in rows:
+        fields = dict(zip(names, row.split(), strict=True))
+        cmyk = tuple(int(float(fields[f"CMYK_{ink}"])) for ink in "CMYK")
+        # The table's Y = 100 becomes 1 without a digit that the table does not have.
+        colours[cmyk] = tuple(round(float(fields[f"XYZ_{axis}"]) / 100, DIGITS) for axis in "XYZ")
+    return colours
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
+    parser.add_argument("-o", "--output", type=Path, default=ROOT / "profiles")
+    arguments = parser.parse_args()
+    for name, make in (("fogra39_gloss", make_fogra39_gloss), ("ward_painting", make_ward_painting)):
+        folder = arguments.output / name
+        folder.mkdir(parents=True, exist_ok=True)
+        write_primaries(make(arguments.data), folder / "primaries.json", overwrite=True)
+
+
+if __name__ == "__main__":
+    main()
