@@ -1,0 +1,152 @@
+"""Reading untrusted bytes: windows that nothing can look out of, and errors that name the place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from iccbrdf.errors import LimitError, ProfileError
+
+MAX_DEPTH = 32
+"""Structures inside structures (tag arrays, calculators) that a tag may nest."""
+MAX_PARTS = 65_536
+"""Elements, curves and members that one tag may hold; one that several positions share counts each time."""
+
+
+class _Budget:
+    """How many parts one tag has used up so far."""
+
+    def __init__(self) -> None:
+        self.spent = 0
+
+
+class Reader:
+    """A window on one structure of a file: reads forward and never beyond its end.
+
+    Attributes
+    ----------
+    start : int
+        Byte offset of the window in the file, which errors report.
+    place : str
+        Path to the structure, as `tag A2M0, element 0 (calc)`.
+    position : int
+        Bytes of the window read so far.
+    """
+
+    def __init__(
+        self,
+        data: bytes | memoryview,
+        source: str,
+        place: str,
+        *,
+        start: int = 0,
+        depth: int = 0,
+        budget: _Budget | None = None,
+    ) -> None:
+        self._data = memoryview(data)
+        self.source = source
+        self.place = place
+        self.start = start
+        self.position = 0
+        self._depth = depth
+        self._budget = budget or _Budget()
+
+    def __len__(self) -> int:
+        return len(self._data)
+
+    @property
+    def left(self) -> int:
+        """Bytes between the position and the end of the window."""
+        return len(self._data) - self.position
+
+    @property
+    def where(self) -> str:
+        """File, place and byte offset, as they begin an error message."""
+        return f"{self.source}: {self.place}: byte offset {self.start + self.position}"
+
+    def error(self, message: str, *, at: int | None = None) -> ProfileError:
+        """The error about what stands at window offset `at` (default: the position)."""
+        offset = self.start + (self.position if at is None else at)
+        return ProfileError(f"{self.source}: {self.place}: byte offset {offset}: {message}")
+
+    def take(self, size: int, what: str) -> memoryview:
+        """The next `size` bytes, which hold `what`; ProfileError where the window ends before."""
+        if size > self.left:
+            raise self.error(f"{what}: found {self.left} bytes, expected {size}")
+        taken = self._data[self.position : self.position + size]
+        self.position += size
+        return taken
+
+    def peek(self, offset: int, size: int, what: str) -> memoryview:
+        """`size` bytes at window offset `offset`, without moving."""
+        if offset + size > len(self):
+            raise self.error(f"{what}: found {max(0, len(self) - offset)} bytes, expected {size}", at=offset)
+        return self._data[offset : offset + size]
+
+    def part(self, offset: int, size: int, name: str) -> Reader:
+        """The window of a structure inside this one.
+
+        Raises ProfileError where it does not lie inside, LimitError where it is nested too deep.
+        """
+        if offset + size > len(self):
+            raise self.error(
+                f"{name}: found bytes {offset} to {offset + size}, expected at most {len(self)}", at=offset
+            )
+        if self._depth == MAX_DEPTH:
+            raise LimitError(
+                f"{self.source}: {self.place}: byte offset {self.start + offset}: {name}: "
+                f"nested deeper than the limit of {MAX_DEPTH}"
+            )
+        return Reader(
+            self._data[offset : offset + size],
+            self.source,
+            f"{self.place}, {name}",
+            start=self.start + offset,
+            depth=self._depth + 1,
+            budget=self._budget,
+        )
+
+    def parts(
+        self,
+        spans: Sequence[tuple[int, int]],
+        label: Callable[[int], str],
+        read: Callable[[Reader, int], Any],
+    ) -> list[Any]:
+        """The structures at `spans` (offset, size), each read by `read(window, index)`, named by `label(index)`.
+
+        Equal spans give one shared object.  Other spans must not overlap one another nor what of this
+        window has been read already, so that the work stays in proportion to the bytes.
+        """
+        self._check_disjoint(spans, label)
+        known: dict[tuple[int, int], tuple[Any, int]] = {}
+        values = []
+        for index, span in enumerate(spans):
+            if span in known:
+                value, weight = known[span]
+                self._spend(weight)
+            else:
+                before = self._budget.spent
+                self._spend(1)
+                value = read(self.part(*span, label(index)), index)
+                known[span] = value, self._budget.spent - before
+            values.append(value)
+        return values
+
+    def _check_disjoint(self, spans: Sequence[tuple[int, int]], label: Callable[[int], str]) -> None:
+        first_index = {span: index for index, span in reversed(list(enumerate(spans)))}
+        end = self.position
+        for span in sorted(first_index):
+            offset, size = span
+            if offset < end:
+                raise self.error(
+                    f"{label(first_index[span])}: found it at {offset} of this structure, expected {end} or "
+                    "later, or position and size the same as another's",
+                    at=offset,
+                )
+            end = offset + size
+
+    def _spend(self, parts: int) -> None:
+        # Shared parts inside shared parts multiply: few bytes could stand for endless objects.
+        self._budget.spent += parts
+        if self._budget.spent > MAX_PARTS:
+            raise LimitError(f"{self.where}: more parts in one tag than the limit of {MAX_PARTS}")
