@@ -63,6 +63,10 @@ class TiffSink:
         self._coverage.add(block)
         self._put(block._replace(data=self._stored(block.data)))
 
+    def finish(self) -> None:
+        """UsageError where pixels are missing."""
+        self._coverage.check_filled()
+
     def _stored(self, data: Array) -> Array:
         if self._dtype.kind == "f":
             return np.asarray(data, self._dtype)
@@ -156,8 +160,9 @@ def create_tiff(
         coverage = Coverage(path, height, width, channels)
         one = U1_15_ONE if xyz else 1 if dtype == "float32" else np.iinfo(stored).max
         with layout as put:
-            yield TiffSink(put, coverage, stored, one)
-            coverage.check_filled()
+            sink = TiffSink(put, coverage, stored, one)
+            yield sink
+            sink.finish()
 
 
 def _check_parameters(

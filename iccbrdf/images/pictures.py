@@ -1,0 +1,77 @@
+"""Whole pictures in memory: the maps (normals, heights, gloss) that come with a job as PNG or TIFF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import imagecodecs
+import numpy as np
+
+from iccbrdf.errors import InputError, LimitError
+from iccbrdf.files import StrPath
+from iccbrdf.images.blocks import Array
+from iccbrdf.images.record import Samples
+from iccbrdf.images.tiff_reader import open_tiff
+
+MAX_PIXELS = 1 << 28
+
+_PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_IHDR_END = 24
+"""The first bytes of a PNG: signature 8, length and name of IHDR 8, width 4, height 4."""
+
+
+def read_picture(path: StrPath, samples: Samples | None = None) -> Array:
+    """Read a PNG or TIFF as numbers; a colour profile or gamma in the file is not applied.
+
+    Parameters
+    ----------
+    path
+        The kind of file is told by its first bytes.
+    samples
+        What the samples of a float TIFF mean, as in `open_tiff`.
+
+    Returns
+    -------
+    Array
+        float32, shape (height, width, channels); integers scaled to 0..1.
+
+    Raises
+    ------
+    InputError
+        The file is missing or damaged, or neither PNG nor TIFF.
+    UnsupportedError
+        A TIFF of a kind that `open_tiff` does not read.
+    LimitError
+        More than 2^28 pixels.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            start = file.read(_IHDR_END)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    if start.startswith(_PNG_SIGNATURE):
+        return _read_png(path, start)
+    if not start.startswith((b"II", b"MM")):
+        raise InputError(f"{path}: neither a PNG nor a TIFF")
+    with open_tiff(path, samples) as source:
+        _check_size(path, source.height, source.width)
+        picture = np.empty((source.height, source.width, source.channels), np.float32)
+        for y0, x0, data in source.blocks():
+            picture[y0 : y0 + data.shape[0], x0 : x0 + data.shape[1]] = data
+        return picture
+
+
+def _read_png(path: StrPath, start: bytes) -> Array:
+    width, height = (int.from_bytes(start[i : i + 4], "big") for i in (16, 20))
+    _check_size(path, height, width)
+    try:
+        pixels = imagecodecs.png_decode(Path(path).read_bytes())
+    except (RuntimeError, ValueError) as error:
+        raise InputError(f"{path}: damaged PNG: {error}") from error
+    picture: Array = np.divide(pixels, np.float32(np.iinfo(pixels.dtype).max), dtype=np.float32)
+    return picture.reshape(height, width, -1)
+
+
+def _check_size(path: StrPath, height: int, width: int) -> None:
+    if height * width > MAX_PIXELS:
+        raise LimitError(f"{path}: {height} x {width} pixels, the limit for a map is {MAX_PIXELS} pixels")
