@@ -106,7 +106,8 @@ def modulo(a: Value, b: Value) -> Value:
 
 
 def near(a: Value, b: Value) -> Value:
-    return truth(np.abs(a - b) < NEAR, a)
+    # The float64 tolerance lies a little above the float32 one, and C compares with the former.
+    return truth(np.abs(a - b) < np.float64(NEAR), a)
 
 
 def minimum(a: Value, b: Value) -> Value:

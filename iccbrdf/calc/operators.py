@@ -52,6 +52,17 @@ class Kind(enum.Enum):
     CONTROL = "no function: the block structure says what runs"
 
 
+class Element(Protocol):
+    """What every processing element of a profile has; the rest depends on its signature."""
+
+    @property
+    def signature(self) -> str: ...
+    @property
+    def inputs(self) -> int: ...
+    @property
+    def outputs(self) -> int: ...
+
+
 class Machine(Protocol):
     """What operators see of the machine that runs them.  Lists hold references; values are never changed."""
 
@@ -88,6 +99,13 @@ class Operator:
     function: Callable[..., Any] | None
     text: str
     accepts: tuple[str, ...] = ()
+
+
+def stack_effect(operator: Operator, s: int, t: int, elements: Sequence[Element]) -> tuple[int, int]:
+    """How many entries the operation pops and pushes, where `elements` are the calculator's sub-elements."""
+    if operator.pops is None or operator.pushes is None:
+        return elements[s].inputs, elements[s].outputs
+    return operator.pops(s, t), operator.pushes(s, t)
 
 
 def apply(operator: Operator, machine: Machine, values: Sequence[Value], s: int, t: int) -> Sequence[Value]:

@@ -96,55 +96,59 @@ class Step(NamedTuple):
 Block: TypeAlias = tuple[Step, ...]
 
 
-def nest(program: Program) -> Block:
-    """The program as nested blocks.
+def nest(program: Program, where: str = "calculator") -> Block:
+    """The program as nested blocks; `where` names its place for messages.
 
     Raises ProfileError where a control operator is misplaced or a block leaves the one around it, and
     LimitError for more than MAX_NESTING levels.
     """
-    return _nest(program, 0, len(program), 0)
+    return _nest(program, where, 0, len(program), 0)
 
 
-def _nest(program: Program, start: int, end: int, level: int) -> Block:
+def _nest(program: Program, where: str, start: int, end: int, level: int) -> Block:
     if level > MAX_NESTING:
-        raise LimitError(f"op {start}: blocks are nested more than {MAX_NESTING} deep")
+        raise LimitError(f"{where}: op {start}: blocks are nested more than {MAX_NESTING} deep")
     steps = []
-    index = start
-    while index < end:
-        op = program[index]
-        if op.name in ("else", "case", "dflt"):
-            after = {"else": "if", "case": "sel or case", "dflt": "case"}[op.name]
-            raise ProfileError(f"op {index}: found {op.name!r}, expected only directly after {after}")
+    position = start
+    while position < end:
+        op = program[position]
+        if op.name in _AFTER:
+            raise ProfileError(
+                f"{where}: op {position}: found {op.name!r}, expected only directly after {_AFTER[op.name]}"
+            )
         if op.name not in ("if", "sel"):
-            steps.append(Step(op, index))
-            index += 1
+            steps.append(Step(op, position))
+            position += 1
             continue
-        heads = _heads(program, index, end)
+        heads = _heads(program, where, position, end)
+        body = position + len(heads)
         blocks = []
-        position = index + len(heads)
         for head in heads if op.name == "if" else heads[1:]:
-            if head.operand > end - position:
+            if head.operand > end - body:
                 raise ProfileError(
-                    f"op {index}: the {head.name!r} block has {head.operand} operations, but only"
-                    f" {end - position} are left in the block around it"
+                    f"{where}: op {position}: the {head.name!r} block has {head.operand} operations,"
+                    f" expected at most the {end - body} left in the block around it"
                 )
-            blocks.append(_nest(program, position, position + head.operand, level + 1))
-            position += head.operand
+            blocks.append(_nest(program, where, body, body + head.operand, level + 1))
+            body += head.operand
         otherwise = blocks.pop() if heads[-1].name in ("else", "dflt") else None
-        steps.append(Step(op, index, tuple(blocks), otherwise, len(heads)))
-        index = position
+        steps.append(Step(op, position, tuple(blocks), otherwise, len(heads)))
+        position = body
     return tuple(steps)
 
 
-def _heads(program: Program, index: int, end: int) -> list[Op]:
-    """The operations that stand together before the blocks of the `if` or `sel` at `index`."""
-    heads = [program[index]]
-    follow = {"if": ("else",), "sel": ("case",), "case": ("case", "dflt")}
-    while len(heads) < end - index and program[index + len(heads)].name in follow.get(heads[-1].name, ()):
-        heads.append(program[index + len(heads)])
-    if heads == [heads[0]] and heads[0].name == "sel":
-        raise ProfileError(f"op {index}: 'sel' has no case, expected 'case' directly after it")
-    return heads
+_AFTER = {"else": "'if'", "case": "'sel' or 'case'", "dflt": "'case'"}
+_FOLLOWERS = {"if": ("else",), "sel": ("case",), "case": ("case", "dflt")}
+
+
+def _heads(program: Program, where: str, position: int, end: int) -> Program:
+    """The operations that stand together before the blocks of the `if` or `sel` at `position`."""
+    last = position
+    while last + 1 < end and program[last + 1].name in _FOLLOWERS.get(program[last].name, ()):
+        last += 1
+    if program[last].name == "sel":
+        raise ProfileError(f"{where}: op {position}: 'sel' without a case, expected 'case' directly after it")
+    return program[position : last + 1]
 
 
 # Text --------------------------------------------------------------------------------------------------

@@ -1,0 +1,221 @@
+"""Refuse a broken program before any pixel is touched, and measure a sound one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from iccbrdf.calc.operators import OPERATORS, Element, Operand, stack_effect
+from iccbrdf.calc.program import MAX_NESTING, Block, Program, Step, nest, signature_name, written
+from iccbrdf.errors import LimitError, ProfileError, nearest
+
+MAX_DEPTH = 65535
+"""Stack entries (ICC.2)."""
+MAX_TEMPORARIES = 65536
+"""Temporary channels (ICC.2)."""
+MAX_CALCULATORS = 32
+"""Calculators inside calculators."""
+MAX_EXECUTED = 1 << 24
+"""Operations for one pixel: calculators that apply others twice could ask for 2^32 from a small file."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What a sound program needs; the calculators among its sub-elements included.
+
+    operations: 8-byte operations stored.
+    executed: operations on the longest path.  Each one stepped on counts: `if` with its `else`, `sel`
+        with all its `case` and `dflt`, and those of an applied calculator besides the one that applies it.
+    max_depth: entries of the deepest stack.  temporaries: highest temporary slot used, plus 1.
+    environment: names of the run-time variables that are read.
+    nesting: blocks and calculators inside each other.
+    """
+
+    operations: int
+    executed: int
+    max_depth: int
+    temporaries: int
+    environment: frozenset[str]
+    nesting: int
+
+
+def verify(
+    program: Program,
+    n_in: int,
+    n_out: int,
+    elements: Sequence[Element] = (),
+    *,
+    where: str = "calculator",
+) -> Checked:
+    """Check a program with n_in input and n_out output channels, and all calculators in its sub-elements.
+
+    Refused are unknown operators; stack underflow on any path, and more than 65535 entries; channels,
+    temporaries and sub-elements out of range or of the wrong kind; broken blocks; an empty program.
+    `where` names the program's place for messages.
+
+    Raises ProfileError (operation, what was found, what was expected), and LimitError for nesting and
+    running time beyond MAX_NESTING, MAX_CALCULATORS and MAX_EXECUTED.
+    """
+    return _verify(program, n_in, n_out, elements, where, 0, {})
+
+
+def verify_element(element: Element, *, where: str = "element") -> tuple[Checked, ...]:
+    """Check the calculators that a processing element is or holds; the results, none for most elements."""
+    return _verify_element(element, where, 0, {})
+
+
+_Known = dict[int, tuple[Checked, ...]]
+"""Elements that are checked already, by id: a file may share one a thousand times."""
+
+
+def _verify_element(element: Element, where: str, level: int, known: _Known) -> tuple[Checked, ...]:
+    if id(element) not in known:
+        known[id(element)] = tuple(
+            _verify(c.program, c.inputs, c.outputs, c.elements, where, level, known)
+            for c in _calculators(element)
+        )
+    return known[id(element)]
+
+
+def _calculators(element: Any) -> list[Any]:
+    if element.signature == "calc":
+        return [element]
+    if element.signature == "cvst":
+        return [curve.calculator for curve in element.curves if curve.signature == "clcf"]
+    return []
+
+
+def _verify(
+    program: Program,
+    n_in: int,
+    n_out: int,
+    elements: Sequence[Element],
+    where: str,
+    level: int,
+    known: _Known,
+) -> Checked:
+    if level > MAX_CALCULATORS:
+        raise LimitError(f"{where}: calculators are nested more than {MAX_CALCULATORS} deep")
+    if not program:
+        raise ProfileError(f"{where}: the program is empty, expected at least one operation")
+    inner = [
+        _verify_element(element, f"{where}, sub-element {index}", level + 1, known)
+        for index, element in enumerate(elements)
+    ]
+    walk = _Walk(where, n_in, n_out, elements, inner)
+    executed = walk.block(nest(program, where), _Path(), 0).executed
+    nested = [checked for results in inner for checked in results]
+    return Checked(
+        operations=len(program) + sum(checked.operations for checked in nested),
+        executed=executed,
+        max_depth=max([walk.max_depth, *(checked.max_depth for checked in nested)]),
+        temporaries=max([walk.temporaries, *(checked.temporaries for checked in nested)]),
+        environment=frozenset(walk.environment).union(*(checked.environment for checked in nested)),
+        nesting=walk.nesting,
+    )
+
+
+@dataclass(frozen=True)
+class _Path:
+    """The paths to a point of the program: least and greatest depth of the stack, most operations."""
+
+    least: int = 0
+    greatest: int = 0
+    executed: int = 0
+
+
+class _Walk:
+    """One pass over the blocks of a program, with what it has found so far."""
+
+    def __init__(
+        self,
+        where: str,
+        n_in: int,
+        n_out: int,
+        elements: Sequence[Element],
+        inner: Sequence[tuple[Checked, ...]],
+    ) -> None:
+        self.where = where
+        self.elements = elements
+        self.inner = inner
+        # What a range of indices may reach, and what it is a range of.
+        channels = {"in": (n_in, "input channels"), "out": (n_out, "output channels")}
+        temporaries = (MAX_TEMPORARIES, "temporaries")
+        self.ranges = channels | dict.fromkeys(("tget", "tput", "tsav"), temporaries)
+        self.max_depth = 0
+        self.temporaries = 0
+        self.environment: set[str] = set()
+        self.nesting = 0
+
+    def error(self, step: Step, message: str) -> ProfileError:
+        return ProfileError(f"{self.where}: op {step.position} ({written(step.op)}): {message}")
+
+    def block(self, block: Block, path: _Path, level: int) -> _Path:
+        self.nest(level)
+        for step in block:
+            path = self.step(step, path, level)
+            if path.executed > MAX_EXECUTED:
+                raise LimitError(
+                    f"{self.where}: a pixel may execute more than {MAX_EXECUTED} operations"
+                    f" by op {step.position}"
+                )
+        return path
+
+    def step(self, step: Step, path: _Path, level: int) -> _Path:
+        op = step.op
+        operator = OPERATORS.get(op.name)
+        if operator is None:
+            hint = nearest(op.name, OPERATORS)
+            raise ProfileError(f"{self.where}: op {step.position}: no operator {op.name!r}: {hint}")
+        executed = path.executed + step.heads
+        if operator.operand is Operand.RANGE:
+            self.range(step)
+        elif operator.operand is Operand.SIGNATURE:
+            self.environment.add(signature_name(op.operand))
+        elif operator.operand is Operand.ELEMENT:
+            executed += self.element(step, operator.accepts, level)
+        pops, pushes = stack_effect(operator, op.s, op.t, self.elements)
+        if pops > path.least:
+            raise self.error(step, f"stack underflow: found {path.least} entries, expected {pops}")
+        change = pushes - pops
+        path = _Path(path.least + change, path.greatest + change, executed)
+        if path.greatest > MAX_DEPTH:
+            found = f"found {path.greatest} entries, expected at most {MAX_DEPTH}"
+            raise self.error(step, f"stack overflow: {found}")
+        self.max_depth = max(self.max_depth, path.greatest)
+        if not step.branches:
+            return path
+        blocks = [*step.branches, step.otherwise or ()]
+        ends = [self.block(block, path, level + 1) for block in blocks]
+        return _Path(
+            min(end.least for end in ends),
+            max(end.greatest for end in ends),
+            max(end.executed for end in ends),
+        )
+
+    def range(self, step: Step) -> None:
+        size, what = self.ranges[step.op.name]
+        end = step.op.s + step.op.t + 1
+        if end > size:
+            raise self.error(step, f"reaches {what} up to {end - 1}, expected less than {size}")
+        if what == "temporaries":
+            self.temporaries = max(self.temporaries, end)
+
+    def element(self, step: Step, accepts: tuple[str, ...], level: int) -> int:
+        """Check an operation that applies a sub-element; the operations that its calculators execute."""
+        index = step.op.s
+        if index >= len(self.elements):
+            raise self.error(step, f"sub-element {index}, expected less than {len(self.elements)}")
+        found = self.elements[index].signature
+        if accepts and found not in accepts:
+            raise self.error(step, f"sub-element {index} is {found!r}, expected {' or '.join(accepts)}")
+        self.nest(level + 1 + max((checked.nesting for checked in self.inner[index]), default=-1))
+        return sum(checked.executed for checked in self.inner[index])
+
+    def nest(self, level: int) -> None:
+        self.nesting = max(self.nesting, level)
+        if level > MAX_NESTING:
+            raise LimitError(
+                f"{self.where}: blocks and calculators are nested more than {MAX_NESTING} deep"
+            )
