@@ -63,7 +63,9 @@ def make_fogra39_gloss(data: Path) -> Primaries:
         gloss = np.array([*np.multiply(ks, PCS_WHITE), m]).round(DIGITS)
         black = np.concatenate([np.zeros(3), gloss])
         kd = np.subtract(colours[cmyk], factor_45_0("brdf1", black)).round(DIGITS)
-        primaries.append(Primary(name, colours[cmyk], (*kd.tolist(), *gloss.tolist()), cmyk))
+        primaries.append(
+            Primary(name, colours[cmyk], (*kd.tolist(), *gloss.tolist()), tuple(map(float, cmyk)))
+        )
     return Primaries(
         model="brdf1",
         illuminant="D50",

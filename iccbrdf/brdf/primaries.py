@@ -180,7 +180,7 @@ def white_of(illuminant: str, observer: str) -> tuple[float, float, float]:
 
     matching_functions = colour.MSDS_CMFS[observer]
     diffuser = colour.sd_ones(matching_functions.shape)
-    spectrum = colour.SDS_ILLUMINANTS[illuminant]
+    spectrum = colour.SDS_ILLUMINANTS[illuminant].copy().align(matching_functions.shape)
     X, Y, Z = colour.sd_to_XYZ(diffuser, matching_functions, spectrum, method="Integration")
     return (float(X / Y), 1.0, float(Z / Y))
 
