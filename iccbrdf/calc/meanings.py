@@ -4,9 +4,10 @@ A value is a 1-D array (one number a pixel of a tile) or a NumPy scalar (the sam
 all values of a run have one dtype, float32 as a CMM has or float64.  Functions return new values of
 that dtype, never change their arguments, and keep scalars scalar.
 
-`+ - * /` and the sums made of them are rounded to the dtype after every operation, left to right, as
-C floats are; roots, powers, logarithms and angles are computed in float64 and rounded once.  Both as
-the reference CMM does it.  Invalid operations give IEEE results; the caller silences NumPy's warnings.
+`+ - * /` and what is made of them are rounded to the dtype after every operation, left to right, as C
+floats are; roots, powers, logarithms and angles are computed in float64 and rounded once.  Both as
+the ICC's reference implementation does it.  Invalid operations give IEEE results; the caller silences
+NumPy's warnings.
 """
 
 from __future__ import annotations
@@ -24,7 +25,6 @@ Value: TypeAlias = NDArray[Any]
 
 INT_MIN = -(2.0**31)
 NEAR = 1.0e-5
-DEGREES = 180.0 / math.pi
 
 # CIE 15: f is a cube root above EPSILON and a line below, meeting at f = 6/29; rounded as in ICC profiles.
 EPSILON, SLOPE, OFFSET, KNEE = 0.008856, 7.787037, 16.0 / 116.0, 0.206893
@@ -66,6 +66,9 @@ def to_int32(value: Value) -> Value:
     return where(fits, np.trunc(value) + 0.0, value.dtype.type(INT_MIN))
 
 
+SQRT, CBRT, SIN, COS = map(in_double, (np.sqrt, np.cbrt, np.sin, np.cos))
+
+
 # One value ---------------------------------------------------------------------------------------------
 
 
@@ -101,8 +104,8 @@ def logical_not(a: Value) -> Value:
 
 
 def modulo(a: Value, b: Value) -> Value:
-    result: Value = a - to_int32(a / b) * b
-    return result
+    """Remainder with the sign of a, exact as C's fmod; a where b is 0."""
+    return where(b == 0, a, np.fmod(a, b))
 
 
 def near(a: Value, b: Value) -> Value:
@@ -127,18 +130,21 @@ def logical(test: Callable[[Value, Value], Value]) -> Callable[[Value, Value], V
     return lambda a, b: truth(test(is_true(a), is_true(b)), a)
 
 
+@in_double
 def angle(x: Value, y: Value) -> Value:
+    """In radians; the abscissa comes first."""
     result: Value = np.arctan2(y, x)
     return result
 
 
 def cartesian_to_polar(x: Value, y: Value) -> tuple[Value, Value]:
-    angle = np.arctan2(y, x) * DEGREES
-    return np.sqrt(x * x + y * y), where(angle < 0, angle + 360.0, angle)
+    degrees = angle(x, y) * 180 / math.pi
+    return SQRT(x * x + y * y), where(degrees < 0, degrees + 360, degrees)
 
 
-def polar_to_cartesian(radius: Value, angle: Value) -> tuple[Value, Value]:
-    return radius * np.cos(angle / DEGREES), radius * np.sin(angle / DEGREES)
+def polar_to_cartesian(radius: Value, degrees: Value) -> tuple[Value, Value]:
+    radians = degrees * math.pi / 180
+    return radius * COS(radians), radius * SIN(radians)
 
 
 # Three values ------------------------------------------------------------------------------------------
@@ -146,19 +152,19 @@ def polar_to_cartesian(radius: Value, angle: Value) -> tuple[Value, Value]:
 
 def xyz_to_lab(x: Value, y: Value, z: Value) -> tuple[Value, Value, Value]:
     """CIELAB of XYZ that is already divided by the white.  The line goes on below zero."""
-    fx, fy, fz = (where(v > EPSILON, np.cbrt(v), SLOPE * v + OFFSET) for v in (x, y, z))
-    return 116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)
+    fx, fy, fz = (where(v > EPSILON, CBRT(v), SLOPE * v + OFFSET) for v in (x, y, z))
+    return 116 * fy - 16, 500 * (fx - fy), 200 * (fy - fz)
 
 
 def lab_to_xyz(lightness: Value, a: Value, b: Value) -> tuple[Value, Value, Value]:
     """XYZ over the white; never negative."""
-    fy = (lightness + 16.0) / 116.0
+    fy = (lightness + 16) / 116
 
     def inverse(f: Value) -> Value:
         line = where(f > OFFSET, (f - OFFSET) / SLOPE, f.dtype.type(0))
         return where(f > KNEE, f * f * f, line)
 
-    return inverse(a / 500.0 + fy), inverse(fy), inverse(fy - b / 200.0)
+    return inverse(a / 500 + fy), inverse(fy), inverse(fy - b / 200)
 
 
 # Any number of values to one ---------------------------------------------------------------------------
