@@ -20,7 +20,7 @@ from iccbrdf.icc.elements import (
     TintArray,
     UnknownElement,
 )
-from iccbrdf.icc.header import MCS_SUBSET, Header, channel_count
+from iccbrdf.icc.header import D50, MCS_SUBSET, Header, channel_count
 from iccbrdf.icc.profile import (
     MissingTagError,
     Profile,
@@ -45,6 +45,7 @@ from iccbrdf.icc.text import describe, to_dict
 
 __all__ = [
     "CURVES",
+    "D50",
     "ELEMENTS",
     "MCS_SUBSET",
     "SEGMENTS",

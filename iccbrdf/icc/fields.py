@@ -16,7 +16,8 @@ from iccbrdf.icc.reader import Reader
 
 Count: TypeAlias = int | Callable[[Seen], int]
 """How many of something a field holds: a number, or a function of the fields read before."""
-FloatArray: TypeAlias = npt.NDArray[np.float32]
+FloatArray: TypeAlias = npt.NDArray[np.floating[Any]]
+"""Any floating-point array will do to make a record; in the record it is float32 and read-only."""
 
 
 def frozen(values: Any, dtype: npt.DTypeLike) -> npt.NDArray[Any]:

@@ -97,6 +97,11 @@ def _listed(valid: Container[Any]) -> str:
     return str(valid)
 
 
+def shown(signature: str) -> str:
+    """A signature for messages: without its padding blanks, escaped where it does not print."""
+    return signature.strip() if signature.isprintable() and signature.strip() else repr(signature)
+
+
 R = TypeVar("R", bound="Record")
 
 
@@ -198,7 +203,7 @@ class Registry:
                 f"{self.kind}: found {signature!r}, expected {' or '.join(map(repr, self.classes))}"
             )
         if reader.position == 0:
-            reader.place += f" ({signature})" if signature.isprintable() else f" ({signature!r})"
+            reader.place += f" ({shown(signature)})"
         return cls.read(reader)
 
     def check(self, value: object) -> Any:

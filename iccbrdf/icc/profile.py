@@ -15,7 +15,7 @@ from iccbrdf.errors import InputError, LimitError, ProfileError, UnsupportedErro
 from iccbrdf.files import atomic_output
 from iccbrdf.icc.elements import MultiProcess
 from iccbrdf.icc.header import SIZE, Header, channel_count
-from iccbrdf.icc.layout import Record
+from iccbrdf.icc.layout import Record, shown
 from iccbrdf.icc.reader import Reader
 from iccbrdf.icc.tags import TAGS
 
@@ -51,7 +51,7 @@ class _Stored:
     @cached_property
     def value(self) -> Any:
         return TAGS.read(
-            Reader(self.data, self._source, f"tag {self._signature!r}", start=self.offset)
+            Reader(self.data, self._source, f"tag {shown(self._signature)}", start=self.offset)
         )
 
 
@@ -73,8 +73,8 @@ class Profile(Mapping[str, Any]):
 
     `profile["A2M0"]` gives the tag's record (`MultiProcess`, `Mluc`, ..., `Unknown`), decoded when it is
     first asked for.  A tag of a known type that is malformed raises ProfileError then, and hinders
-    nothing else.  Tags that share their data in the file are one object, and one object under several signatures is
-    written once.
+    nothing else.  Tags that share their data in the file are one object, and one object under several
+    signatures is written once.
 
     A profile does not change; `replace` makes a changed one, in which the tags that were not replaced keep
     their bytes.  Two profiles are equal when they are written as the same bytes.
@@ -96,9 +96,9 @@ class Profile(Mapping[str, Any]):
         try:
             TAGS.check(value)
         except ValueError as error:
-            raise UsageError(f"tag {signature!r}: {error}") from None
+            raise UsageError(f"tag {shown(signature)}: {error}") from None
         if problem := self._contradiction(signature, value):
-            raise UsageError(f"tag {signature!r}: {problem}")
+            raise UsageError(f"tag {shown(signature)}: {problem}")
 
     @classmethod
     def from_bytes(cls, data: bytes, source: str = "<bytes>") -> Profile:
@@ -132,10 +132,10 @@ class Profile(Mapping[str, Any]):
     def __getitem__(self, signature: str) -> Any:
         """The tag's record.  Raises MissingTagError (a ProfileError and a KeyError), ProfileError."""
         if signature not in self._tags:
-            raise MissingTagError(f"{self.source}: tag {signature!r} is missing")
+            raise MissingTagError(f"{self.source}: tag {shown(signature)} is missing")
         value = self._tags[signature].value
         if problem := self._contradiction(signature, value):
-            raise ProfileError(f"{self.source}: tag {signature!r}: {problem}")
+            raise ProfileError(f"{self.source}: tag {shown(signature)}: {problem}")
         return value
 
     def _contradiction(self, signature: str, value: Record) -> str | None:
@@ -172,13 +172,13 @@ class Profile(Mapping[str, Any]):
     def tag_data(self, signature: str) -> bytes:
         """The bytes of a tag as they are, or will be, in the file, its type signature included."""
         if signature not in self._tags:
-            raise MissingTagError(f"{self.source}: tag {signature!r} is missing")
+            raise MissingTagError(f"{self.source}: tag {shown(signature)} is missing")
         return bytes(self._tags[signature].data)
 
     def tag_offset(self, signature: str) -> int | None:
         """Where the tag's data begins in the file that was read; None for a tag made in memory."""
         if signature not in self._tags:
-            raise MissingTagError(f"{self.source}: tag {signature!r} is missing")
+            raise MissingTagError(f"{self.source}: tag {shown(signature)} is missing")
         return self._tags[signature].offset
 
     def replace(
@@ -188,7 +188,7 @@ class Profile(Mapping[str, Any]):
         tags: Mapping[str, Record] | None = None,
         remove: Iterable[str] = (),
     ) -> Profile:
-        """A changed copy: another header, `tags` put in their places or at the end, those in `remove` left out."""
+        """A changed copy: another header, `tags` put in place or at the end, those in `remove` left out."""
         changed = Profile(header or self.header, tags or {}, source=self.source)
         changed._tags = {**self._tags, **changed._tags}
         for signature in remove:
@@ -237,7 +237,7 @@ def _read_table(data: bytes, source: str) -> dict[str, _Stored | _Made]:
             )
     stored = reader.parts(
         [(offset, size) for _, offset, size in entries],
-        lambda index: f"tag {names[index]!r}",
+        lambda index: f"tag {shown(names[index])}",
         lambda part, index: _Stored(part.take(part.left, "data"), source, names[index], part.start),
     )
     return dict(zip(names, stored, strict=True))

@@ -112,10 +112,11 @@ class Reader:
         label: Callable[[int], str],
         read: Callable[[Reader, int], Any],
     ) -> list[Any]:
-        """The structures at `spans` (offset, size), each read by `read(window, index)`, named by `label(index)`.
+        """The structures at `spans` (offset, size), each read by `read(window, index)`.
 
-        Equal spans give one shared object.  Other spans must not overlap one another nor what of this
-        window has been read already, so that the work stays in proportion to the bytes.
+        `label(index)` names one in messages.  Equal spans give one shared object.  Other spans must not
+        overlap one another nor what of this window has been read already, so that the work stays in
+        proportion to the bytes.
         """
         self._check_disjoint(spans, label)
         known: dict[tuple[int, int], tuple[Any, int]] = {}

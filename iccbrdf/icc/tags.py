@@ -142,6 +142,8 @@ class _LocalisedTexts(FieldType):
 
     def normal(self, value: Iterable[LocalisedText]) -> tuple[LocalisedText, ...]:
         for item in value:
+            if not isinstance(item, LocalisedText):
+                raise ValueError(f"found {item!r}, expected a LocalisedText")
             if len(item.language.encode("latin-1")) != 2 or len(item.country.encode("latin-1")) != 2:
                 raise ValueError(f"found {item.language!r}, {item.country!r}, expected two characters each")
             item.text.encode("utf-16-be")

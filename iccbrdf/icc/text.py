@@ -97,11 +97,12 @@ def _numbers(array: npt.NDArray[Any]) -> Any:
 
 
 def _number(value: Any) -> Any:
-    """The shortest decimal that gives `value` back in its own precision."""
+    """The shortest decimal that gives `value` back, in single precision if it has no more."""
     if isinstance(value, np.integer):
         return int(value)
     if math.isfinite(value):
-        return float(str(value))
+        single = np.float32(value) if abs(value) < 1e38 else value
+        return float(str(single if single == value else value))
     return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
 
 
