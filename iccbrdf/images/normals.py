@@ -55,7 +55,8 @@ def read_normal_map(path: StrPath, convention: Convention = "opengl") -> Array:
         raise InputError(f"{path}: {picture.shape[2]} channels, expected a normal map in red, green and blue")
     if not (picture.min() >= 0 and picture.max() <= 1):
         raise InputError(
-            f"{path}: values from {picture.min():.6g} to {picture.max():.6g}; a normal map holds (n + 1)/2, in 0..1"
+            f"{path}: values from {picture.min():.6g} to {picture.max():.6g}, "
+            "expected (n + 1)/2 of each component, in 0..1"
         )
     normals: Array = 2 * picture[:, :, :3] - 1
     if convention == "directx":

@@ -164,6 +164,8 @@ class TiffStorage:
 def _only_image(file: Any, path: StrPath) -> Any:
     """The one page of a file that is neither a thumbnail nor another reduction."""
     pages = [page for page in file.pages if not page.is_reduced]
+    if not pages:
+        raise InputError(f"{path}: damaged TIFF: there is no image in it")
     if len(pages) != 1:
         raise UnsupportedError(
             f"{path}: holds {len(pages)} images, expected one, with the channels interleaved or planar in it"
