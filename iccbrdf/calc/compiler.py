@@ -1,0 +1,97 @@
+"""From the text of a template to a verified calculator program: source, lower, passes, emit, verify."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from iccbrdf.calc.emit import emit
+from iccbrdf.calc.graph import Graph
+from iccbrdf.calc.lower import lower
+from iccbrdf.calc.passes import Report, optimise
+from iccbrdf.calc.program import Program
+from iccbrdf.calc.source import parse
+from iccbrdf.calc.verify import verify
+from iccbrdf.errors import InputError
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """
+    A compiled template.
+
+    model: its name.  documentation: the comment at its head.
+    program: the operators; none but those that every implementation of ICC.2 has.
+    inputs, outputs: channel names in order.  defaults: one number for each input, what a print that lacks
+        the channel has.
+    variables: run-time (CMM environment) variables and the value of each where it is undefined.
+    constants: compile-time constants (tuples of numbers) and choices (names) as they were used.
+    effects: all switches of the template, on or off.
+    executed: operators on the longest path for one pixel, every 8-byte operator counted.
+    graph: what the program computes.  report: what each pass did.
+    """
+
+    model: str
+    documentation: str
+    program: Program
+    inputs: tuple[str, ...]
+    defaults: tuple[float, ...]
+    outputs: tuple[str, ...]
+    variables: Mapping[str, float]
+    constants: Mapping[str, tuple[float, ...] | str]
+    effects: Mapping[str, bool]
+    executed: int
+    graph: Graph
+    report: tuple[Report, ...]
+
+
+def compile_template(
+    text: str,
+    *,
+    filename: str,
+    constants: Mapping[str, float | Sequence[float] | str] | None = None,
+    effects: Mapping[str, bool] | None = None,
+) -> Compiled:
+    """
+    Compile a template.
+
+    Parameters
+    ----------
+    text
+        The template; the language is described in iccbrdf.calc.source and iccbrdf.calc.lower.
+    filename
+        For messages.
+    constants
+        Constants (a number, or as many as the default has) and choices (a name) that differ from the
+        template's defaults.  Folded in float64, rounded to float32 once, where they are written.
+    effects
+        Switches that differ from the template's defaults.
+
+    Raises
+    ------
+    InputError
+        An error in the template at file:line:column, or a constant, choice or effect that it does not
+        declare, with the nearest that it does.
+    """
+    try:
+        template = parse(text, filename)
+        lowered = lower(template, constants or {}, effects or {})
+    except RecursionError:
+        raise InputError(f"{filename}: expressions are nested too deeply; use `let` for parts") from None
+    graph, report = optimise(lowered.graph)
+    program = emit(graph)
+    checked = verify(program, len(lowered.inputs), len(lowered.outputs), where=filename)
+    return Compiled(
+        model=lowered.model,
+        documentation=template.documentation,
+        program=program,
+        inputs=tuple(lowered.inputs),
+        defaults=tuple(lowered.defaults),
+        outputs=tuple(lowered.outputs),
+        variables=lowered.variables,
+        constants=lowered.constants,
+        effects=lowered.effects,
+        executed=checked.executed,
+        graph=graph,
+        report=report,
+    )

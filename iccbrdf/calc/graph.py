@@ -1,0 +1,243 @@
+"""The graph between sources and targets: what a program computes, without saying how.
+
+A node is a vector of 1..n numbers, computed once from other nodes (static single assignment).  Equal nodes
+are one node: the graph finds a node by operator, arguments and detail before it makes a new one, so
+whatever is written twice is shared.  Operators on vectors work element by element; the planes of an ICC
+vector operator are the nodes' components.
+
+Beside the calculator's own operators of the kinds EACH and REDUCE (calc/operators.py) there are
+
+| op     | detail          | value                                                                |
+|--------|-----------------|----------------------------------------------------------------------|
+| const  | the numbers     | constants, float64 until a target rounds them                        |
+| input  | first channel   | `width` input channels                                               |
+| env    | name, default   | a run-time variable, or the default where it is undefined            |
+| pack   |                 | all the arguments' components in one vector                          |
+| pick   | first component | `width` components of the argument                                   |
+| splat  |                 | a scalar repeated                                                    |
+| rotl   | k               | the components rotated: component k comes first                      |
+| select |                 | condition, yes, no: only the chosen one need be computed             |
+
+An operator that gives several vectors (`tLab`: 3) has them one after the other in one node.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from iccbrdf.calc.operators import OPERATORS, Kind
+from iccbrdf.errors import IccBrdfError
+
+
+class GraphError(IccBrdfError):
+    """A graph breaks its own rules: a fault of the compiler, never of its input."""
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """One value; compared by identity, which in one graph is equality."""
+
+    index: int
+    op: str
+    arguments: tuple[Node, ...]
+    detail: Any
+    width: int
+
+    def __repr__(self) -> str:
+        shown = [f"%{argument.index}" for argument in self.arguments]
+        if self.detail is not None:
+            shown.append(repr(self.detail))
+        return f"%{self.index}[{self.width}] = {self.op}({', '.join(shown)})"
+
+
+@dataclass
+class Graph:
+    """Nodes in an order in which each follows its arguments, and the ones that are the program's outputs."""
+
+    nodes: list[Node] = field(default_factory=list)
+    outputs: tuple[Node, ...] = ()
+    shared: int = 0
+    """How often an operator was asked for that was there already."""
+    _known: dict[tuple[Any, ...], Node] = field(default_factory=dict, repr=False)
+
+    def add(self, op: str, arguments: Sequence[Node] = (), detail: Any = None, width: int = 0) -> Node:
+        """The node of this operator and these arguments; `width` matters where they leave it open."""
+        arguments = tuple(arguments)
+        width = _width(op, arguments, detail, width)
+        # -0 and 0 are equal keys, but not equal constants.
+        exact = tuple(map(float.hex, detail)) if op == "const" else detail
+        key = (op, tuple(argument.index for argument in arguments), exact, width)
+        node = self._known.get(key)
+        if node is None:
+            node = Node(len(self.nodes), op, arguments, detail, width)
+            self.nodes.append(node)
+            self._known[key] = node
+        elif arguments:
+            self.shared += 1
+        return node
+
+    def const(self, *values: float) -> Node:
+        return self.add("const", detail=tuple(map(float, values)))
+
+    def input(self, first: int, width: int = 1) -> Node:
+        return self.add("input", detail=first, width=width)
+
+    def env(self, name: str, default: float) -> Node:
+        return self.add("env", detail=(name, default))
+
+    def pack(self, parts: Sequence[Node]) -> Node:
+        return self.add("pack", parts)
+
+    def pick(self, vector: Node, first: int, width: int = 1) -> Node:
+        return self.add("pick", [vector], first, width)
+
+    def splat(self, scalar: Node, width: int) -> Node:
+        return self.add("splat", [scalar], width=width)
+
+    def rotl(self, vector: Node, k: int) -> Node:
+        return self.add("rotl", [vector], k)
+
+    def live(self) -> list[Node]:
+        """The nodes that the outputs need, in order."""
+        return needed_by(self.outputs)
+
+
+def needed_by(nodes: Iterable[Node], skip: Callable[[Node], bool] = lambda node: False) -> list[Node]:
+    """`nodes` and all that they are computed from, in order of index, less what is behind `skip`."""
+    found: set[Node] = set()
+    pending = list(nodes)
+    while pending:
+        node = pending.pop()
+        if node not in found and not skip(node):
+            found.add(node)
+            pending.extend(node.arguments)
+    return sorted(found, key=lambda node: node.index)
+
+
+# Rules -------------------------------------------------------------------------------------------------
+
+
+def is_elementwise(op: str) -> bool:
+    """Whether the op works on each component alone and gives one vector."""
+    row = OPERATORS.get(op)
+    return row is not None and row.kind is Kind.EACH and gives(op) == 1
+
+
+def takes(op: str) -> int:
+    """The number of arguments of an operator of the kind EACH."""
+    pops = OPERATORS[op].pops
+    return pops(0, 0) if pops else 0
+
+
+def gives(op: str) -> int:
+    """The number of vectors that an operator of the kind EACH gives."""
+    pushes = OPERATORS[op].pushes
+    return pushes(0, 0) if pushes else 0
+
+
+def _require(holds: bool, op: str, arguments: Sequence[Node], rule: str) -> None:
+    if not holds:
+        raise GraphError(f"{op} of widths {[argument.width for argument in arguments]}: {rule}")
+
+
+def _width(op: str, arguments: Sequence[Node], detail: Any, asked: int) -> int:
+    """The width of a node, or GraphError where its parts do not fit."""
+    widths = [argument.width for argument in arguments]
+    counts = {"const": 0, "input": 0, "env": 0, "pick": 1, "splat": 1, "rotl": 1, "select": 3}
+    if op in counts:
+        _require(len(arguments) == counts[op], op, arguments, f"takes {counts[op]} argument(s)")
+    if op == "const":
+        _require(len(detail) > 0, op, arguments, "needs a number")
+        return len(detail)
+    if op == "env":
+        return 1
+    if op == "input":
+        _require(asked > 0 and detail >= 0, op, arguments, "needs channels")
+        return asked
+    if op == "pack":
+        _require(len(arguments) > 1, op, arguments, "takes two arguments or more")
+        return sum(widths)
+    if op == "pick":
+        end = detail + asked
+        _require(0 <= detail < end <= widths[0], op, arguments, f"has no components {detail} to {end - 1}")
+        return asked
+    if op == "splat":
+        _require(widths == [1] and asked > 0, op, arguments, "repeats a scalar")
+        return asked
+    if op == "rotl":
+        _require(0 < detail < widths[0], op, arguments, f"cannot be rotated by {detail}")
+        return widths[0]
+    if op == "select":
+        _require(widths[0] == 1 and widths[1] == widths[2], op, arguments, "condition is 1, sides are equal")
+        return widths[1]
+    row = OPERATORS.get(op)
+    if row is not None and row.kind is Kind.REDUCE:
+        _require(len(widths) == 1 and widths[0] > 1, op, arguments, "takes one vector of two or more")
+        return 1
+    if row is not None and row.kind is Kind.EACH:
+        alike = len(widths) == takes(op) and len(set(widths)) == 1
+        _require(alike, op, arguments, f"takes {takes(op)} of equal width")
+        return widths[0] * gives(op)
+    raise GraphError(f"{op!r} is no operator of the graph")
+
+
+def check(graph: Graph) -> None:
+    """
+    Verify a graph: every node follows its arguments, all widths fit, no two nodes are equal.
+
+    Raises
+    ------
+    GraphError
+        With the node that breaks a rule.
+    """
+    seen = set()
+    for position, node in enumerate(graph.nodes):
+        if node.index != position:
+            raise GraphError(f"{node} stands at {position}")
+        for argument in node.arguments:
+            if argument.index >= position or graph.nodes[argument.index] is not argument:
+                raise GraphError(f"{node} uses %{argument.index}, which does not come before it")
+        if _width(node.op, node.arguments, node.detail, node.width) != node.width:
+            raise GraphError(f"{node} has a wrong width")
+        exact = tuple(map(float.hex, node.detail)) if node.op == "const" else node.detail
+        key = (node.op, node.arguments, exact, node.width)
+        if key in seen:
+            raise GraphError(f"{node} is there twice")
+        seen.add(key)
+    for output in graph.outputs:
+        if output.index >= len(graph.nodes) or graph.nodes[output.index] is not output:
+            raise GraphError(f"output {output} is of another graph")
+
+
+# Constants ---------------------------------------------------------------------------------------------
+
+
+def evaluate(
+    op: str, arguments: Sequence[Sequence[float]], detail: Any, width: int
+) -> tuple[float, ...] | None:
+    """The value in float64 of a node whose arguments are these numbers; None for what only a run knows."""
+    if op == "pack":
+        return tuple(value for argument in arguments for value in argument)
+    if op == "pick":
+        return tuple(arguments[0][detail : detail + width])
+    if op == "splat":
+        return tuple(arguments[0]) * width
+    if op == "rotl":
+        return (*arguments[0][detail:], *arguments[0][:detail])
+    if op == "select":
+        return tuple(arguments[1] if arguments[0][0] >= 0.5 else arguments[2])
+    row = OPERATORS.get(op)
+    if row is None or row.function is None:
+        return None
+    planes = [[np.float64(value) for value in argument] for argument in arguments]
+    with np.errstate(all="ignore"):
+        if row.kind is Kind.REDUCE:
+            return (float(row.function(planes[0])),)
+        results = [row.function(*values) for values in zip(*planes, strict=True)]
+    if gives(op) > 1:
+        return tuple(float(value) for plane in zip(*results, strict=True) for value in plane)
+    return tuple(map(float, results))
