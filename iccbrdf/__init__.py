@@ -1,0 +1,69 @@
+"""Directional appearance in ICC.2 profiles.
+
+>>> import iccbrdf
+>>> transform = iccbrdf.link(["mid.icc", "mvis.icc"], env={"litX": 0.5})     # doctest: +SKIP
+>>> XYZ = transform(brdf_image)                                              # doctest: +SKIP
+
+What stands here is the public face; the modules behind it are imported when a name is first used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from iccbrdf.errors import (
+    IccBrdfError,
+    InputError,
+    LimitError,
+    LinkError,
+    ProfileError,
+    ProfileWarning,
+    UnsupportedError,
+    UsageError,
+    VariableError,
+)
+
+if TYPE_CHECKING:
+    from iccbrdf.cmm import Transform, link
+    from iccbrdf.icc import Profile, read_profile, write_profile
+
+__version__ = "0.1.0"
+
+_LAZY = {
+    "Profile": "iccbrdf.icc",
+    "Transform": "iccbrdf.cmm",
+    "link": "iccbrdf.cmm",
+    "read_profile": "iccbrdf.icc",
+    "write_profile": "iccbrdf.icc",
+}
+
+__all__ = [
+    "IccBrdfError",
+    "InputError",
+    "LimitError",
+    "LinkError",
+    "Profile",
+    "ProfileError",
+    "ProfileWarning",
+    "Transform",
+    "UnsupportedError",
+    "UsageError",
+    "VariableError",
+    "__version__",
+    "link",
+    "read_profile",
+    "write_profile",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(_LAZY[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

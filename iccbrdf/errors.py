@@ -59,6 +59,10 @@ class LimitError(IccBrdfError):
     exit_code = 4
 
 
+class ProfileWarning(UserWarning):
+    """A profile deviates from the specification in a way that does not hinder its use."""
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
     """The end of a message about an unknown name: the nearest valid one, or all of them when none is near."""
     valid = list(valid)

@@ -42,11 +42,29 @@ PATCHES = {
 GARNET_RED = (0.265, 0.251)
 KRYLON_BLUE = (0.205, 0.213)
 
+# Elevation tints of a relief map, from the lowest to the highest ground.
+TINTS = {
+    "Valley": (70, 30, 85, 0),
+    "Foot of the hills": (55, 10, 70, 0),
+    "Low hills": (20, 10, 55, 0),
+    "Hills": (10, 30, 70, 0),
+    "Slopes": (40, 55, 85, 0),
+    "High slopes": (55, 70, 85, 0),
+    "Ridge": (10, 10, 10, 0),
+    "Summit": (0, 0, 0, 0),
+}
+
 FOGRA39_SOURCE = (
     "Colours: FOGRA39L characterisation data, coated offset, D50, 2 degrees, 45:0 (Fogra, 2006). "
     "Gloss: ks and m fitted to two paints measured by the Cornell Program of Computer Graphics, garnet red "
     "(paper and single inks) and krylon true blue (overprints and K, the thicker ink). This pairing is the "
     "project's own: no goniometric measurement of printed CMYK is public. kd: the XYZ less the gloss at 45:0."
+)
+LANDSCAPE_SOURCE = (
+    "Colours: FOGRA39L characterisation data, coated offset, D50, 2 degrees, 45:0 (Fogra, 2006), chosen as "
+    "elevation tints from low to high ground. Gloss: ks and m fitted to two paints measured by the Cornell "
+    "Program of Computer Graphics, from krylon true blue in the valley to garnet red on the summit. This "
+    "pairing is the project's own. kd: the XYZ less the gloss at 45:0."
 )
 PAINTING_SOURCE = (
     "F. Marton, Cape Spartivento Lighthouse, oil on canvas, measured by cnr-isti-vclab (OpenLIME): mean of "
@@ -56,10 +74,34 @@ PAINTING_SOURCE = (
 
 def make_fogra39_gloss(data: Path) -> Primaries:
     """Return FOGRA39 colours with the gloss of two paints, so that the model at 45:0 gives the XYZ."""
+    glosses = {
+        name: KRYLON_BLUE if np.count_nonzero(cmyk) > 1 or name == "K" else GARNET_RED
+        for name, cmyk in PATCHES.items()
+    }
+    return fogra39_print(data, PATCHES, glosses, FOGRA39_SOURCE)
+
+
+def make_landscape(data: Path) -> Primaries:
+    """Return elevation tints in FOGRA39 colours, whose gloss passes from one paint to the other."""
+    share = np.linspace(0, 1, len(TINTS))
+    glosses = {
+        name: tuple((np.array(KRYLON_BLUE) + s * np.subtract(GARNET_RED, KRYLON_BLUE)).tolist())
+        for name, s in zip(TINTS, share, strict=True)
+    }
+    return fogra39_print(data, TINTS, glosses, LANDSCAPE_SOURCE)
+
+
+def fogra39_print(
+    data: Path,
+    patches: dict[str, tuple[int, ...]],
+    glosses: dict[str, tuple[float, ...]],
+    source: str,
+) -> Primaries:
+    """Return patches of FOGRA39 with ks (of a white of Y = 1) and m by name, and kd so that XYZ holds at 45:0."""
     colours = read_colours(data / "print" / "FOGRA39L.ti3")
     primaries = []
-    for name, cmyk in PATCHES.items():
-        ks, m = KRYLON_BLUE if np.count_nonzero(cmyk) > 1 or name == "K" else GARNET_RED
+    for name, cmyk in patches.items():
+        ks, m = glosses[name]
         gloss = np.array([*np.multiply(ks, PCS_WHITE), m]).round(DIGITS)
         black = np.concatenate([np.zeros(3), gloss])
         kd = np.subtract(colours[cmyk], factor_45_0("brdf1", black)).round(DIGITS)
@@ -72,7 +114,7 @@ def make_fogra39_gloss(data: Path) -> Primaries:
         observer=TWO_DEGREES,
         white=PCS_WHITE,
         geometry="45:0",
-        source=FOGRA39_SOURCE,
+        source=source,
         primaries=tuple(primaries),
     )
 
@@ -136,12 +178,19 @@ def read_colours(path: Path) -> dict[tuple[int, ...], tuple[float, ...]]:
     return colours
 
 
+MAKERS = {
+    "fogra39_gloss": make_fogra39_gloss,
+    "landscape": make_landscape,
+    "ward_painting": make_ward_painting,
+}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "profiles")
     arguments = parser.parse_args()
-    for name, make in (("fogra39_gloss", make_fogra39_gloss), ("ward_painting", make_ward_painting)):
+    for name, make in MAKERS.items():
         folder = arguments.output / name
         folder.mkdir(parents=True, exist_ok=True)
         write_primaries(make(arguments.data), folder / "primaries.json", overwrite=True)

@@ -1,0 +1,146 @@
+"""Primaries -> a binding MID and the MVIS it goes with, as profile objects.
+
+The MID decodes device channels, all within 0..1, into the model's multiplex channels; the MVIS holds the
+model as a calculator program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from iccbrdf.brdf.primaries import Primaries
+from iccbrdf.build.listing import listing
+from iccbrdf.build.models import MODELS
+from iccbrdf.build.viewing import Viewing, viewing
+from iccbrdf.calc import Compiled, compile_template
+from iccbrdf.icc import (
+    XYZ,
+    Calculator,
+    Header,
+    Matrix,
+    Mluc,
+    MultiProcess,
+    NumberArray,
+    Profile,
+    TagArray,
+)
+from iccbrdf.resources import folder
+
+COPYRIGHT = "No copyright, use freely"
+
+_NORMAL_RANGE = (-1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A MID, the MVIS it goes with, and a listing of both for people."""
+
+    mid: Profile
+    mvis: Profile
+    listing: str
+    compiled: Compiled
+
+
+def build_pair(
+    primaries: Primaries,
+    *,
+    effects: Collection[str] | None = None,
+    without: Collection[str] = (),
+    fresnel_angle: str | None = None,
+    variables: Mapping[str, float] | None = None,
+) -> Pair:
+    """Build the profiles of the model, the viewing conditions and the encoding that `primaries` states.
+
+    Parameters
+    ----------
+    primaries
+        As `iccbrdf.brdf.read_primaries` gives them.
+    effects
+        Names of the effects to simulate; default: all that the model has.
+    without
+        Names of effects to leave out.
+    fresnel_angle
+        `theta_i` (as printed) or `alpha` (between half vector and view: reciprocal); default: `theta_i`.
+    variables
+        Values of run-time variables that hold where the CMM's environment sets none.
+
+    Raises
+    ------
+    InputError
+        An effect or a variable is unknown.
+    """
+    model = MODELS[primaries.model]
+    path = folder("calc_templates") / model.template
+    constants: dict[str, Any] = {"white": primaries.white}
+    if model.has_refractive_index:
+        constants["refractive_index"] = primaries.refractive_index
+    if fresnel_angle is not None:
+        constants["fresnel_angle"] = fresnel_angle
+    compiled = compile_template(
+        path.read_text(encoding="utf-8"),
+        filename=path.name,
+        constants=constants,
+        effects={**_switches(path, effects), **model.effects, **dict.fromkeys(without, False)},
+        **({"variables": variables} if variables else {}),
+    )
+    conditions = viewing(primaries.illuminant, primaries.observer, primaries.white)
+    ranges = _ranges(compiled.inputs, primaries.encoding)
+    mid = _mid(compiled.inputs, ranges, model.title)
+    mvis = _mvis(compiled, conditions, model.title)
+    return Pair(mid, mvis, listing(model.title, compiled, ranges, conditions), compiled)
+
+
+def _switches(path: Path, effects: Collection[str] | None) -> dict[str, bool]:
+    """All the effects of a template, on where `effects` names them; nothing where that is None."""
+    if effects is None:
+        return {}
+    known = compile_template(path.read_text(encoding="utf-8"), filename=path.name).effects
+    return {**dict.fromkeys(known, False), **dict.fromkeys(effects, True)}
+
+
+def _ranges(channels: Sequence[str], encoding: Mapping[str, float]) -> list[tuple[float, float]]:
+    """What the device values 0 and 1 of each channel stand for; `encoding` goes by family (`kd` of `kd.X`)."""
+    families = [channel.partition(".")[0] for channel in channels]
+    return [_NORMAL_RANGE if family == "n" else (0.0, encoding.get(family, 1.0)) for family in families]
+
+
+def _mid(channels: Sequence[str], ranges: Sequence[tuple[float, float]], name: str) -> Profile:
+    n = len(channels)
+    low, high = np.array(ranges, np.float32).T
+    decode = Matrix(inputs=n, matrix=np.diag(high - low), offset=low)
+    header = Header(device_class="mid ", colour_space=f"nc{n:04x}", mcs=f"mc{n:04x}")
+    return Profile(
+        header,
+        {
+            "desc": Mluc.of(f"MID for {name}"),
+            "cprt": Mluc.of(COPYRIGHT),
+            "mcta": TagArray.of_texts(channels),
+            "A2M0": MultiProcess(n, n, (decode,)),
+        },
+    )
+
+
+def _mvis(compiled: Compiled, conditions: Viewing, name: str) -> Profile:
+    n = len(compiled.inputs)
+    program = Calculator(inputs=n, outputs=3, program=compiled.program)
+    header = Header(device_class="mvis", pcs="XYZ ", mcs=f"mc{n:04x}", illuminant=conditions.white)
+    tags: dict[str, Any] = {
+        "desc": Mluc.of(f"MVIS for {name}, {conditions.text}"),
+        "cprt": Mluc.of(COPYRIGHT),
+        "mcta": TagArray.of_texts(compiled.inputs),
+        "mdv ": NumberArray("fl32", np.array(compiled.defaults)),
+        "wtpt": XYZ.of(*conditions.white),
+        "M2B0": MultiProcess(n, 3, (program,)),
+    }
+    if conditions.svcn is not None:
+        tags |= {
+            "svcn": conditions.svcn,
+            "c2sp": conditions.to_standard(),
+            "s2cp": conditions.from_standard(),
+        }
+    return Profile(header, tags)

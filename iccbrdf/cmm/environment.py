@@ -1,0 +1,30 @@
+"""Run-time (CMM environment) variables: do a caller's names and values fit those that a chain reads?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from iccbrdf.errors import VariableError, nearest
+
+RESERVED = ("true", "ndef")
+"""Signatures that ICC.2 itself defines: always 1, never defined."""
+
+
+def checked_environment(env: Mapping[str, float], variables: Iterable[str]) -> dict[str, float]:
+    """`env` with float values; VariableError for a name that no profile reads, or for what is no number."""
+    variables = tuple(variables)
+    checked = {}
+    for name, value in env.items():
+        if name not in variables:
+            raise VariableError(
+                f"run-time variable {name!r} is read by none of the profiles: {nearest(name, variables)}"
+            )
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            number = math.nan
+        if not math.isfinite(number):
+            raise VariableError(f"run-time variable {name!r}: found {value!r}, expected a finite number")
+        checked[name] = number
+    return checked

@@ -1,0 +1,114 @@
+"""Profiles -> a Transform.
+
+The rules are those of ICC.2: multiplex channels are routed by name, connection spaces meet under common
+viewing conditions, rendering intents choose among the tags.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from iccbrdf.cmm.arrange import arranged, without_decoding
+from iccbrdf.cmm.environment import checked_environment
+from iccbrdf.cmm.join import join, media_white
+from iccbrdf.cmm.stages import INTENTS, stages
+from iccbrdf.cmm.steps import Process, Step
+from iccbrdf.cmm.transform import Transform
+from iccbrdf.errors import UsageError, nearest
+from iccbrdf.icc import Profile, read_profile
+
+BACKENDS = ("auto", "interpreter")
+
+
+def link(
+    profiles: Iterable[str | os.PathLike[str] | Profile],
+    *,
+    env: Mapping[str, float] | None = None,
+    backend: str = "auto",
+    threads: int = 1,
+    intent: str = "relative",
+    dtype: npt.DTypeLike = np.float32,
+    channels: Sequence[str] | None = None,
+    samples: str = "device",
+) -> Transform:
+    """Link v5 profiles, paths or objects, into one transform.
+
+    Parameters
+    ----------
+    profiles
+        The chain, in order: a MID and an MVIS, either of them alone, or any chain whose spaces meet.
+    env
+        Run-time variables by name; those not given take the defaults that the programs hold.
+    backend
+        `auto` or `interpreter`.
+    threads
+        Tiles that run at a time.
+    intent
+        `perceptual`, `relative`, `saturation` or `absolute`.
+    dtype
+        float32, as a CMM computes, or float64.
+    channels
+        Names of the channels that the caller has, in the caller's order; default: all the first profile's
+        device channels in its order.  A channel that the caller lacks takes the default of the MVIS, which
+        needs a first profile that decodes its channels one by one (a matrix, one channel a row).
+    samples
+        `device`: input is 0..1, as the first profile's device space.  `real`: input is what the device
+        values stand for (signed normals, physical parameters); the profile's leading matrix is left out.
+
+    Raises
+    ------
+    ProfileError
+        A profile is malformed, or a program in it is unsafe.
+    LinkError
+        Two profiles do not fit together, or a channel is nowhere.
+    VariableError
+        `env` names a variable that no profile reads.
+    UsageError
+        An argument has no such value.
+    """
+    chain = [p if isinstance(p, Profile) else read_profile(p) for p in profiles]
+    if not chain:
+        raise UsageError("no profile to link")
+    for value, valid, what in (
+        (backend, BACKENDS, "backend"),
+        (intent, INTENTS, "intent"),
+        (samples, ("device", "real"), "samples"),
+    ):
+        if value not in valid:
+            raise UsageError(f"{what} {value!r} is unknown: {nearest(str(value), valid)}")
+    number_type = {np.dtype(np.float32): np.float32, np.dtype(np.float64): np.float64}.get(np.dtype(dtype))
+    if number_type is None:
+        raise UsageError(f"dtype {dtype!r} is unknown: valid are float32 and float64")
+    if threads < 1:
+        raise UsageError(f"threads is {threads}, expected at least 1")
+
+    absolute = intent == "absolute"
+    first, *others = stages(chain, intent)
+    if samples == "real":
+        first = without_decoding(first)
+    steps: list[Step] = []
+    if channels is not None:
+        steps, first = arranged(first, tuple(channels))
+    steps.append(first.step())
+    for before, after in pairwise([first, *others]):
+        steps += [*join(before, after, absolute=absolute), after.step()]
+    last = others[-1] if others else first
+    if last.destination.kind == "pcs":
+        steps += media_white(last, absolute, outward=True)
+
+    variables = tuple(dict.fromkeys(v for step in steps if isinstance(step, Process) for v in step.variables))
+    return Transform(
+        channels_in=tuple(channels) if channels is not None else first.source.names,
+        channels_out=last.destination.names,
+        steps=tuple(steps),
+        variables=variables,
+        env=checked_environment(env or {}, variables),
+        dtype=number_type,
+        backend="interpreter",
+        threads=threads,
+    )

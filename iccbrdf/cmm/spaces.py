@@ -1,0 +1,111 @@
+"""The spaces on either side of a profile's transform, and the names of their channels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from iccbrdf.errors import ProfileError, UnsupportedError
+from iccbrdf.icc import MultiProcess, Profile, TagArray, channel_count
+
+_NAMES = {
+    "XYZ ": ("X", "Y", "Z"),
+    "Lab ": ("L*", "a*", "b*"),
+    "RGB ": ("R", "G", "B"),
+    "CMYK": ("C", "M", "Y", "K"),
+    "CMY ": ("C", "M", "Y"),
+    "GRAY": ("Gray",),
+}
+
+
+@dataclass(frozen=True)
+class Space:
+    """`kind` is device, mcs or pcs; `signature` the header's four characters (or nc000a, mc000a)."""
+
+    kind: str
+    signature: str
+    names: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """For messages."""
+        kind = {"device": "device space", "mcs": "multiplex space", "pcs": "connection space"}[self.kind]
+        return f"{kind} {self.signature.strip()} of {len(self.names)} channels"
+
+
+def pcs_space(profile: Profile) -> Space:
+    """The colorimetric connection space."""
+    signature = profile.header.pcs
+    if signature not in ("XYZ ", "Lab "):
+        if profile.header.spectral_pcs:
+            raise UnsupportedError(f"{profile.source}: a spectral connection space, which cannot run yet")
+        raise ProfileError(
+            f"{profile.source}: header: connection space {signature!r}, expected 'XYZ ' or 'Lab '"
+        )
+    return Space("pcs", signature, _NAMES[signature])
+
+
+def mcs_space(profile: Profile) -> Space:
+    """The multiplex channel space, whose names stand in the tag mcta."""
+    signature = profile.header.mcs
+    count = channel_count(signature)
+    if not signature.startswith("mc") or count is None:
+        raise ProfileError(
+            f"{profile.source}: header: multiplex space {signature!r}, expected mc and four hex digits"
+        )
+    names = profile.get("mcta")
+    if names is None:
+        raise ProfileError(f"{profile.source}: tag mcta (names of the multiplex channels) is missing")
+    if not isinstance(names, TagArray):
+        raise ProfileError(
+            f"{profile.source}: tag mcta: found type {names.signature!r}, expected a tag array"
+        )
+    try:
+        texts = names.texts()
+    except ValueError as error:
+        raise ProfileError(f"{profile.source}: tag mcta: {error}") from None
+    if len(texts) != count:
+        raise ProfileError(f"{profile.source}: tag mcta: {len(texts)} names, expected {count} by the header")
+    for i, text in enumerate(texts):
+        if text in texts[:i]:
+            raise ProfileError(f"{profile.source}: tag mcta: channel name {text!r} comes twice")
+    return Space("mcs", signature, texts)
+
+
+def device_space(profile: Profile, field: str = "colour_space") -> Space:
+    """The device space of the header's `field`.
+
+    Its channels are named by the colour space; of an unnamed one (ncNNNN, NCLR), each channel that alone
+    feeds one multiplex channel bears that channel's name, and others are numbered from 1.
+    """
+    signature: str = getattr(profile.header, field)
+    if signature in _NAMES:
+        return Space("device", signature, _NAMES[signature])
+    count = channel_count(signature)
+    if count is None:
+        raise UnsupportedError(f"{profile.source}: header: device space {signature!r} is not known")
+    return Space("device", signature, _decoded_names(profile, count) or tuple(map(str, range(1, count + 1))))
+
+
+def _decoded_names(profile: Profile, count: int) -> tuple[str, ...] | None:
+    """Names of device channels by what a decoding matrix makes of them; None where that is not one to one."""
+    process = profile.get("A2M0")
+    if not isinstance(process, MultiProcess) or len(process.elements) != 1:
+        return None
+    inputs = single_inputs(process.elements[0])
+    if inputs is None or len(inputs) != count:
+        return None
+    names = mcs_space(profile).names
+    return tuple(names[inputs.index(i)] for i in range(count))
+
+
+def single_inputs(element: Any) -> tuple[int, ...] | None:
+    """For each row of a decoding matrix its one input, each input once; None for any other element."""
+    if element.signature != "matf" or element.matrix is None or element.inputs != element.outputs:
+        return None
+    used = [np.flatnonzero(row) for row in element.matrix]
+    if any(len(u) != 1 for u in used) or len({int(u[0]) for u in used}) != element.inputs:
+        return None
+    return tuple(int(u[0]) for u in used)

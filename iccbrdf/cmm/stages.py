@@ -1,0 +1,122 @@
+"""What one profile contributes to a chain: which of its tags runs, between which spaces."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from iccbrdf.cmm.spaces import Space, device_space, mcs_space, pcs_space
+from iccbrdf.cmm.steps import Process
+from iccbrdf.errors import ProfileError, ProfileWarning, UnsupportedError, nearest
+from iccbrdf.icc import MultiProcess, Profile
+
+INTENTS = ("perceptual", "relative", "saturation", "absolute")
+
+# Which of the tags ...0 to ...3 stands for an intent, in the order of preference.  Relative and absolute
+# stand for each other by way of the media white (ICC.2, 8.x); ...0 stands for any; the rest deviates from
+# the specification and is warned about.
+_PREFERENCE = {0: (0, 1, 3, 2), 1: (1, 3, 0, 2), 2: (2, 0, 1, 3), 3: (3, 1, 0, 2)}
+_BY_THE_BOOK = {0: (0,), 1: (1, 3, 0), 2: (2, 0), 3: (3, 1, 0)}
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One profile's part in the chain."""
+
+    profile: Profile
+    tag: str
+    process: MultiProcess
+    source: Space
+    destination: Space
+    absolute: bool
+    """Whether its colorimetric side is absolute (a ...3 tag) rather than relative to the media white."""
+
+    @property
+    def where(self) -> str:
+        """The tag's place, for messages."""
+        return f"{self.profile.source}: tag {self.tag}"
+
+    def step(self) -> Process:
+        """The tag as a step that is safe to run."""
+        return Process.checked(self.process, self.where)
+
+
+def stages(chain: Sequence[Profile], intent: str) -> list[Stage]:
+    """The stages of a chain of profiles under a rendering intent; which tag runs depends on the neighbours."""
+    found: list[Stage] = []
+    for i, profile in enumerate(chain):
+        source = found[-1].destination if found else None
+        following = chain[i + 1].header.device_class if i + 1 < len(chain) else ""
+        found.append(_stage(profile, source, following, INTENTS.index(intent)))
+    return found
+
+
+def _stage(profile: Profile, before: Space | None, following: str, intent: int) -> Stage:
+    """The transform that `profile` contributes between the space before it and the profile after it."""
+    device_class = profile.header.device_class
+    if profile.header.version[0] < 5:
+        raise UnsupportedError(
+            f"{profile.source}: version {profile.header.version[0]}; only version 5 profiles link here"
+        )
+    to_mcs = device_class == "mid " or (
+        profile.header.mcs and "A2M0" in profile and following in ("mvis", "mlnk")
+    )
+    if to_mcs:
+        tag, source, destination = "A2M0", device_space(profile), mcs_space(profile)
+    elif device_class == "mvis":
+        tag, source, destination = (
+            _by_intent(profile, ("M2B",), intent),
+            mcs_space(profile),
+            pcs_space(profile),
+        )
+    elif device_class == "mlnk":
+        tag, source, destination = "M2A0", mcs_space(profile), device_space(profile)
+    elif device_class == "link":
+        tag, source, destination = "A2B0", device_space(profile), device_space(profile, field="pcs")
+    elif device_class == "abst":
+        tag, source, destination = _by_intent(profile, ("D2B", "A2B"), intent), *(pcs_space(profile),) * 2
+    elif before is not None and before.kind == "pcs":
+        tag = _by_intent(profile, ("B2D", "B2A"), intent)
+        source, destination = pcs_space(profile), device_space(profile)
+    else:
+        tag = _by_intent(profile, ("D2B", "A2B"), intent)
+        source, destination = device_space(profile), pcs_space(profile)
+    process = _multi_process(profile, tag)
+    for side, space, found in (("in", source, process.inputs), ("out", destination, process.outputs)):
+        if found != len(space.names):
+            raise ProfileError(
+                f"{profile.source}: tag {tag} has {found} channels {side}, "
+                f"expected {len(space.names)} by the header ({space.text})"
+            )
+    return Stage(profile, tag, process, source, destination, absolute=tag.endswith("3"))
+
+
+def _by_intent(profile: Profile, families: tuple[str, ...], intent: int) -> str:
+    for family in families:
+        for n in _PREFERENCE[intent]:
+            tag = f"{family}{n}"
+            if tag not in profile:
+                continue
+            if n not in _BY_THE_BOOK[intent]:
+                warnings.warn(
+                    f"{profile.source}: no tag for the {INTENTS[intent]} intent; {tag} stands in",
+                    ProfileWarning,
+                    stacklevel=5,
+                )
+            return tag
+    wanted = " or ".join(f"{family}0..3" for family in families)
+    if "M2S0" in profile:
+        raise UnsupportedError(f"{profile.source}: only spectral transforms (M2S), which cannot run yet")
+    raise ProfileError(f"{profile.source}: none of the tags {wanted} is there")
+
+
+def _multi_process(profile: Profile, tag: str) -> MultiProcess:
+    value = profile.get(tag)
+    if value is None:
+        raise ProfileError(f"{profile.source}: tag {tag} is missing: {nearest(tag, profile)}")
+    if not isinstance(value, MultiProcess):
+        raise UnsupportedError(
+            f"{profile.source}: tag {tag} is of type {value.signature!r}; only processing elements can run"
+        )
+    return value

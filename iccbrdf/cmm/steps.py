@@ -1,0 +1,123 @@
+"""The steps of a linked chain.  Each maps planar channels to planar channels and is plain data.
+
+A channel is a NumPy array (one tile of pixels) or a scalar (uniform over the tile).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from iccbrdf.calc import elements as calc_elements
+from iccbrdf.calc.verify import verify_element
+from iccbrdf.cmm.environment import RESERVED
+from iccbrdf.errors import ProfileError, UnsupportedError, nearest
+from iccbrdf.icc import MultiProcess
+
+Channel = Any
+"""A 1-D array over the tile, or a scalar."""
+
+
+class Step(Protocol):
+    """What a transform runs."""
+
+    def apply(self, channels: Sequence[Channel], env: Mapping[str, float], dtype: Any) -> list[Channel]: ...
+
+
+@dataclass(frozen=True)
+class Process:
+    """The elements of one multiProcessElements tag, in order; `origin` names its place for messages."""
+
+    origin: str
+    elements: tuple[Any, ...]
+    variables: tuple[str, ...]
+    """Run-time variables that the calculators among them read."""
+
+    @classmethod
+    def checked(cls, process: MultiProcess, origin: str) -> Process:
+        """After the checks that make it safe to run: counts pass on from element to element, sound programs.
+
+        Raises ProfileError, LimitError or UnsupportedError.
+        """
+        width = process.inputs
+        variables: set[str] = set()
+        for i, element in enumerate(process.elements):
+            place = f"{origin}: element {i} ({element.signature})"
+            if element.inputs != width:
+                raise ProfileError(f"{place} has {element.inputs} channels in, expected {width}")
+            if element.signature not in calc_elements._FUNCTIONS:
+                raise UnsupportedError(
+                    f"{place} cannot run: {nearest(element.signature, calc_elements._FUNCTIONS)}"
+                )
+            variables.update(*(c.environment for c in verify_element(element, where=place)))
+            width = element.outputs
+        if width != process.outputs:
+            raise ProfileError(
+                f"{origin}: the last element gives {width} channels, expected {process.outputs}"
+            )
+        return cls(origin, process.elements, tuple(sorted(variables.difference(RESERVED))))
+
+    def apply(self, channels: Sequence[Channel], env: Mapping[str, float], dtype: Any) -> list[Channel]:
+        for element in self.elements:
+            channels = calc_elements.apply(element, channels, env=env, dtype=dtype)
+        return list(channels)
+
+
+@dataclass(frozen=True)
+class Route:
+    """Picks channels by position; where `sources` has None, the default of that place stands instead."""
+
+    sources: tuple[int | None, ...]
+    defaults: tuple[float, ...]
+
+    def apply(self, channels: Sequence[Channel], env: Mapping[str, float], dtype: Any) -> list[Channel]:
+        return [
+            dtype(default) if source is None else channels[source]
+            for source, default in zip(self.sources, self.defaults, strict=True)
+        ]
+
+
+@dataclass(frozen=True)
+class Scale:
+    """One factor a channel: the change between media-relative and absolute XYZ."""
+
+    factors: tuple[float, ...]
+
+    def apply(self, channels: Sequence[Channel], env: Mapping[str, float], dtype: Any) -> list[Channel]:
+        return [channel * dtype(factor) for channel, factor in zip(channels, self.factors, strict=True)]
+
+
+# CIE 15:2018, 8.2.1: the cube root gives way to a line below (6/29)^3.
+_EPSILON = (6 / 29) ** 3
+_SLOPE = (29 / 6) ** 2 / 3
+
+
+@dataclass(frozen=True)
+class XYZToLab:
+    """XYZ (Y = 1 for the white) -> CIELAB relative to `white`."""
+
+    white: tuple[float, float, float]
+
+    def apply(self, channels: Sequence[Channel], env: Mapping[str, float], dtype: Any) -> list[Channel]:
+        ratios = [np.asarray(c, dtype) / dtype(w) for c, w in zip(channels, self.white, strict=True)]
+        x, y, z = (np.where(t > _EPSILON, np.cbrt(t), t * dtype(_SLOPE) + dtype(4 / 29)) for t in ratios)
+        return [dtype(116) * y - dtype(16), dtype(500) * (x - y), dtype(200) * (y - z)]
+
+
+@dataclass(frozen=True)
+class LabToXYZ:
+    """CIELAB relative to `white` -> XYZ (Y = 1 for the white)."""
+
+    white: tuple[float, float, float]
+
+    def apply(self, channels: Sequence[Channel], env: Mapping[str, float], dtype: Any) -> list[Channel]:
+        lightness, a, b = (np.asarray(c, dtype) for c in channels)
+        y = (lightness + dtype(16)) / dtype(116)
+        roots = (y + a / dtype(500), y, y - b / dtype(200))
+        return [
+            dtype(w) * np.where(f > 6 / 29, f**3, (f - dtype(4 / 29)) / dtype(_SLOPE))
+            for f, w in zip(roots, self.white, strict=True)
+        ]

@@ -1,0 +1,76 @@
+"""A linked chain of profiles, ready to map pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from iccbrdf.cmm.environment import checked_environment
+from iccbrdf.cmm.steps import Step
+from iccbrdf.errors import InputError
+
+TILE = 16384
+"""Pixels a tile: the registers of a Cook-Torrance program on float32 tiles of this size stay within L2."""
+
+
+@dataclass(frozen=True)
+class Transform:
+    """Maps arrays (..., channels in) to arrays (..., channels out); made by `iccbrdf.link`.
+
+    Values are real ones: XYZ has Y = 1 for the white, L* runs to 100, device channels are in 0..1 and are
+    not clipped.  A transform is immutable and pickles.
+    """
+
+    channels_in: tuple[str, ...]
+    """Names of the input channels, in order."""
+    channels_out: tuple[str, ...]
+    """Names of the output channels, in order."""
+    steps: tuple[Step, ...]
+    variables: tuple[str, ...]
+    """Names of the run-time variables that the profiles read."""
+    env: Mapping[str, float]
+    dtype: type[np.floating[Any]]
+    backend: str
+    threads: int
+
+    def __call__(self, array: npt.ArrayLike) -> npt.NDArray[np.floating[Any]]:
+        """`array` (..., channels in) through the chain; raises InputError where the channels do not fit."""
+        pixels = np.asarray(array)
+        if pixels.dtype.kind not in "fiu":
+            raise InputError(f"the array holds {pixels.dtype}, expected real numbers")
+        if pixels.ndim == 0 or pixels.shape[-1] != len(self.channels_in):
+            raise InputError(
+                f"the array has shape {pixels.shape}, expected (..., {len(self.channels_in)}): "
+                + ", ".join(self.channels_in)
+            )
+        flat = pixels.reshape(-1, len(self.channels_in))
+        out = np.empty((len(flat), len(self.channels_out)), self.dtype)
+        starts = range(0, len(flat), TILE)
+
+        def tile(start: int) -> None:
+            self._run(flat[start : start + TILE], out[start : start + TILE])
+
+        if self.threads > 1 and len(starts) > 1:
+            with ThreadPoolExecutor(self.threads) as pool:
+                list(pool.map(tile, starts))
+        else:
+            for start in starts:
+                tile(start)
+        return out.reshape(*pixels.shape[:-1], len(self.channels_out))
+
+    def _run(self, pixels: npt.NDArray[Any], out: npt.NDArray[Any]) -> None:
+        channels: list[Any] = list(np.ascontiguousarray(pixels.T, self.dtype))
+        with np.errstate(all="ignore"):
+            for step in self.steps:
+                channels = step.apply(channels, self.env, self.dtype)
+        for i, channel in enumerate(channels):
+            out[:, i] = channel
+
+    def with_env(self, env: Mapping[str, float]) -> Transform:
+        """The same chain under other run-time variables; those not named keep their value."""
+        return replace(self, env={**self.env, **checked_environment(env, self.variables)})

@@ -1,0 +1,62 @@
+"""The scene of `iccbrdf demo`: a relief print of a real landscape, as a BRDF image.
+
+Heights: the digital elevation model of the Jacksboro fault, Tennessee, that comes with matplotlib.
+Colours: elevation tints of FOGRA39 inks; gloss: two measured paints, matt in the valleys and a little
+glossier on the ridges (profiles/landscape).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from iccbrdf.brdf.models import MODELS
+from iccbrdf.brdf.primaries import Primaries
+from iccbrdf.images.normals import height_to_normals
+
+PRINT_WIDTH = 200.0
+"""Width of the print, mm."""
+PIXEL_PITCH = 0.2
+"""Of the print, mm."""
+EXAGGERATION = 1.5
+"""Vertical scale over horizontal scale: at 1 the 840 m of relief would be 5.6 mm on a print of 30 km."""
+
+_METRES_PER_DEGREE = 111_320.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A BRDF image: device values in 0..1, (height, width, channels), and names of the channels."""
+
+    device: npt.NDArray[np.float32]
+    names: tuple[str, ...]
+
+
+def landscape(primaries: Primaries) -> Scene:
+    """The relief print whose tints, from the lowest to the highest ground, are those of `primaries`."""
+    heights, pitch = _heights()
+    normals = height_to_normals(heights * EXAGGERATION, pitch)
+    level = (heights - heights.min()) / np.ptp(heights)
+    steps = np.linspace(0, 1, len(primaries.primaries))
+    tints = np.stack([np.interp(level, steps, column) for column in primaries.parameters.T], axis=-1)
+    device = np.concatenate([tints / primaries.scales, (normals + 1) / 2], axis=-1, dtype=np.float32)
+    return Scene(device, (*MODELS[primaries.model].channels, "n.x", "n.y", "n.z"))
+
+
+def _heights() -> tuple[npt.NDArray[np.float64], float]:
+    """Heights on the print's pixel grid, and the grid's pitch, both in mm of the unexaggerated print."""
+    from matplotlib.cbook import get_sample_data
+    from scipy.ndimage import zoom
+
+    with get_sample_data("jacksboro_fault_dem.npz") as dem:
+        metres = dem["elevation"].astype(np.float64)
+        # The file calls its northern edge ymin: row 0 is in the north.
+        latitude = np.radians((dem["ymin"] + dem["ymax"]) / 2)
+        cell_x = dem["dx"] * _METRES_PER_DEGREE * np.cos(latitude)
+        cell_y = dem["dy"] * _METRES_PER_DEGREE
+    ground_width = metres.shape[1] * cell_x
+    pixel = ground_width * PIXEL_PITCH / PRINT_WIDTH
+    smooth = zoom(metres, (cell_y / pixel, cell_x / pixel), order=3, mode="nearest", grid_mode=True)
+    return smooth * PRINT_WIDTH / ground_width, PIXEL_PITCH
