@@ -330,9 +330,7 @@ class Positioned(FieldType):
         write_parts(out, value)
 
     def normal(self, value: Any) -> tuple[Any, ...]:
-        return tuple(
-            None if v is None and self.optional else self.registry.check(v) for v in value
-        )
+        return tuple(None if v is None and self.optional else self.registry.check(v) for v in value)
 
 
 def read_spans(reader: Reader, count: int, name: str) -> list[tuple[int, int]]:

@@ -50,9 +50,7 @@ class _Stored:
 
     @cached_property
     def value(self) -> Any:
-        return TAGS.read(
-            Reader(self.data, self._source, f"tag {shown(self._signature)}", start=self.offset)
-        )
+        return TAGS.read(Reader(self.data, self._source, f"tag {shown(self._signature)}", start=self.offset))
 
 
 class _Made:
