@@ -50,7 +50,7 @@ def _heights() -> tuple[npt.NDArray[np.float64], float]:
     from matplotlib.cbook import get_sample_data
     from scipy.ndimage import zoom
 
-    with get_sample_data("jacksboro_fault_dem.npz") as dem:
+    with np.load(get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)) as dem:
         metres = dem["elevation"].astype(np.float64)
         # The file calls its northern edge ymin: row 0 is in the north.
         latitude = np.radians((dem["ymin"] + dem["ymax"]) / 2)

@@ -97,7 +97,7 @@ def fogra39_print(
     glosses: dict[str, tuple[float, ...]],
     source: str,
 ) -> Primaries:
-    """Return patches of FOGRA39 with ks (of a white of Y = 1) and m by name, and kd so that XYZ holds at 45:0."""
+    """Return patches of FOGRA39 with ks (of a white of Y = 1) and m by name, and kd that fits XYZ at 45:0."""
     colours = read_colours(data / "print" / "FOGRA39L.ti3")
     primaries = []
     for name, cmyk in patches.items():

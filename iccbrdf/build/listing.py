@@ -34,9 +34,11 @@ def _lines(
         yield f"    {name:<5} {value:.9g}"
     yield "  constants"
     for name, constant in compiled.constants.items():
-        yield f"    {name} = {constant if isinstance(constant, str) else ' '.join(f'{c:g}' for c in constant)}"
-    for state, text in ((True, "effects simulated"), (False, "effects left out")):
-        yield f"  {text}: {', '.join(name for name, on in compiled.effects.items() if on is state) or 'none'}"
+        text = constant if isinstance(constant, str) else " ".join(f"{value:g}" for value in constant)
+        yield f"    {name} = {text}"
+    for state, heading in ((True, "effects simulated"), (False, "effects left out")):
+        names = [name for name, on in compiled.effects.items() if on is state]
+        yield f"  {heading}: {', '.join(names) or 'none'}"
     yield ""
     yield (
         f"Program (tag M2B0): {len(compiled.program)} operators, "

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Model:
-    """`title` for people; `template`, the file in calc_templates; `effects` that the model itself switches."""
+    """`title` for people; `template`, a file in calc_templates; `effects` that the model itself sets."""
 
     title: str
     template: str

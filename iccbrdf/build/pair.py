@@ -104,7 +104,7 @@ def _switches(path: Path, effects: Collection[str] | None) -> dict[str, bool]:
 
 
 def _ranges(channels: Sequence[str], encoding: Mapping[str, float]) -> list[tuple[float, float]]:
-    """What the device values 0 and 1 of each channel stand for; `encoding` goes by family (`kd` of `kd.X`)."""
+    """What the device values 0 and 1 of each channel stand for; `encoding` goes by family, `kd` of `kd.X`."""
     families = [channel.partition(".")[0] for channel in channels]
     return [_NORMAL_RANGE if family == "n" else (0.0, encoding.get(family, 1.0)) for family in families]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -96,9 +97,10 @@ def _tables(illuminant: str, observer: str) -> tuple[npt.NDArray[np.float64], np
 def _adaptation(source: tuple[float, ...], target: tuple[float, ...]) -> npt.NDArray[np.float64]:
     """Von Kries adaptation in Bradford's cone space (ICC.1, Annex E)."""
     gains = (_BRADFORD @ target) / (_BRADFORD @ source)
-    return np.linalg.inv(_BRADFORD) @ np.diag(gains) @ _BRADFORD
+    matrix: npt.NDArray[np.float64] = np.linalg.inv(_BRADFORD) @ np.diag(gains) @ _BRADFORD
+    return matrix
 
 
-def _matrix_process(matrix: npt.NDArray[np.float64]) -> MultiProcess:
+def _matrix_process(matrix: npt.NDArray[np.floating[Any]]) -> MultiProcess:
     element = Matrix(inputs=3, matrix=matrix, offset=np.zeros(3))
     return MultiProcess(3, 3, (element,))

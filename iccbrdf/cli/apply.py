@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
@@ -12,7 +12,7 @@ from iccbrdf.cli.pipeline import Output, arranged_channels, check_outputs, run
 from iccbrdf.cmm import INTENTS, link
 from iccbrdf.errors import UsageError
 from iccbrdf.icc import read_profile
-from iccbrdf.images import open_tiff
+from iccbrdf.images import Samples, open_tiff
 
 EPILOG = """
 \b
@@ -58,9 +58,9 @@ def command(
     view: str | None,
     env: tuple[str, ...],
     intent: str,
-    samples: str | None,
+    samples: Samples | None,
     channels: str | None,
-    dtype: str,
+    dtype: Literal["float32", "uint16"],
     embed: bool,
     exposure: float,
     depth: str,
@@ -76,9 +76,8 @@ def command(
     """
     chain = [read_profile(path) for path in profiles]
     last = chain[-1]
-    targets = [
-        Output(path, dtype, last.to_bytes() if embed else None, exposure, int(depth)) for path in outputs
-    ]
+    embedded = last.to_bytes() if embed else None
+    targets = [Output(path, dtype, embedded, exposure, 16 if depth == "16" else 8) for path in outputs]
     check_outputs(targets, overwrite=force)
     if not exposure > 0:
         raise UsageError(f"--exposure is {exposure}, expected a number above 0")

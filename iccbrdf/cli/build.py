@@ -29,8 +29,8 @@ Examples:
 @click.option("--effects", metavar="NAMES", help="Simulate these effects only, separated by commas.")
 @click.option("--without", metavar="NAMES", help="Simulate all effects but these, separated by commas.")
 @click.option("--fresnel-angle", type=click.Choice(("theta_i", "alpha")),
-              help="Angle of the Fresnel term: of incidence, as printed (default), or between half vector and "
-              "view, which keeps the model reciprocal.")  # fmt: skip
+              help="Angle of the Fresnel term: of incidence, as printed (the default), or between half "
+              "vector and view, which keeps the model reciprocal.")  # fmt: skip
 @scene_options
 @force_option
 @json_option

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -27,13 +27,13 @@ class Output:
     """A file to write: a TIFF of what the transform gives, or a PNG softproof, by its suffix."""
 
     path: Path
-    dtype: str = "float32"
+    dtype: Literal["float32", "uint16"] = "float32"
     """Sample type of a TIFF: float32, or uint16 for XYZ in u1.15."""
     profile: bytes | None = None
     """Profile to embed in a TIFF."""
     exposure: float = 1.0
     """Factor on the XYZ of a PNG."""
-    depth: int = 8
+    depth: Literal[8, 16] = 8
     """Bits of a PNG's samples."""
 
     @property
@@ -89,7 +89,7 @@ def run(
         for block in _progress(source, label):
             result = transform(block.data)
             done.not_finite += int(result.size - np.count_nonzero(np.isfinite(result)))
-            display = to_display(result) if to_display else None
+            display = to_display(result) if to_display else result
             for output, sink in zip(outputs, sinks, strict=True):
                 sink.write(block._replace(data=display if output.is_png else result))
     for output, sink in zip(outputs, sinks, strict=True):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +24,7 @@ from iccbrdf.errors import UsageError, nearest
 from iccbrdf.icc import Profile, read_profile
 
 BACKENDS = ("auto", "interpreter")
+_NUMBER_TYPES: tuple[type[np.floating[Any]], ...] = (np.float32, np.float64)
 
 
 def link(
@@ -81,9 +83,7 @@ def link(
     ):
         if value not in valid:
             raise UsageError(f"{what} {value!r} is unknown: {nearest(str(value), valid)}")
-    number_type = {np.dtype(np.float32): np.float32, np.dtype(np.float64): np.float64}.get(np.dtype(dtype))
-    if number_type is None:
-        raise UsageError(f"dtype {dtype!r} is unknown: valid are float32 and float64")
+    number_type = _number_type(dtype)
     if threads < 1:
         raise UsageError(f"threads is {threads}, expected at least 1")
 
@@ -112,3 +112,13 @@ def link(
         backend="interpreter",
         threads=threads,
     )
+
+
+def _number_type(dtype: npt.DTypeLike) -> type[np.floating[Any]]:
+    for number_type in _NUMBER_TYPES:
+        try:
+            if np.dtype(dtype) == number_type:
+                return number_type
+        except TypeError:  # no type at all
+            break
+    raise UsageError(f"dtype {dtype!r} is unknown: valid are float32 and float64")

@@ -43,7 +43,7 @@ class Stage:
 
 
 def stages(chain: Sequence[Profile], intent: str) -> list[Stage]:
-    """The stages of a chain of profiles under a rendering intent; which tag runs depends on the neighbours."""
+    """The stages of a chain of profiles; which tag runs depends on the intent and on the neighbours."""
     found: list[Stage] = []
     for i, profile in enumerate(chain):
         source = found[-1].destination if found else None
