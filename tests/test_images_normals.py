@@ -175,8 +175,8 @@ def test_unreadable_pictures(tmp_path, monkeypatch):
         with pytest.raises(InputError, match="damaged PNG"):
             read_picture(path)
     path.write_bytes(whole)
-    monkeypatch.setattr(pictures, "MAX_PIXELS", 599)
-    with pytest.raises(LimitError, match="20 x 30 pixels, the limit for a map is 599"):
+    monkeypatch.setattr(pictures, "MAX_SAMPLES", 2399)
+    with pytest.raises(LimitError, match="20 x 30 pixels with 4 channels, the limit for a map is 2399"):
         read_picture(path)
 
 

@@ -64,6 +64,8 @@ LAYOUTS = {
     "deflate strips": {"rowsperstrip": 7, "compression": "deflate"},
     "predicted deflate tiles": {"tile": (16, 32), "compression": "deflate", "predictor": True},
     "lzw strips": {"rowsperstrip": 1, "compression": "lzw"},
+    "packbits strips": {"rowsperstrip": 3, "compression": "packbits"},
+    "lzma tiles": {"tile": (16, 16), "compression": "lzma"},
     "zstd tiles": {"tile": (32, 16), "compression": "zstd"},
 }
 
@@ -224,6 +226,8 @@ def test_images_of_another_kind(tmp_path):
     refused(path, UnsupportedError, "orientation 3, supported is 1")
     tifffile.imwrite(path, pixels[:, :, 0] > 9, photometric="minisblack")
     refused(path, UnsupportedError, "samples of 1 bits")
+    tifffile.imwrite(path, pixels[:, :, :3], photometric="rgb", compression="jpeg2000")
+    refused(path, UnsupportedError, "compression JPEG2000, supported are NONE, LZW")
     for dtype in ("int16", "uint32", "complex64"):
         tifffile.imwrite(path, pixels[:, :, 0].astype(dtype))
         refused(path, UnsupportedError, "supported are unsigned integers of 8 and 16 bits and floats")

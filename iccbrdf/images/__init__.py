@@ -1,8 +1,26 @@
 """Images in and out: TIFF streams, normal and height maps, PNG for the display."""
 
 from iccbrdf.images.blocks import Block
+from iccbrdf.images.display import PngSink, create_png, srgb_profile, xyz_to_srgb
+from iccbrdf.images.normals import height_to_normals, read_height_map, read_normal_map
+from iccbrdf.images.pictures import read_picture
 from iccbrdf.images.record import Samples
 from iccbrdf.images.tiff_reader import TiffSource, open_tiff
 from iccbrdf.images.tiff_writer import TiffSink, create_tiff
 
-__all__ = ["Block", "Samples", "TiffSink", "TiffSource", "create_tiff", "open_tiff"]
+__all__ = [
+    "Block",
+    "PngSink",
+    "Samples",
+    "TiffSink",
+    "TiffSource",
+    "create_png",
+    "create_tiff",
+    "height_to_normals",
+    "open_tiff",
+    "read_height_map",
+    "read_normal_map",
+    "read_picture",
+    "srgb_profile",
+    "xyz_to_srgb",
+]

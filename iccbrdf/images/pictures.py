@@ -13,8 +13,9 @@ from iccbrdf.images.blocks import Array
 from iccbrdf.images.record import Samples
 from iccbrdf.images.tiff_reader import open_tiff
 
-MAX_PIXELS = 1 << 28
+MAX_SAMPLES = 1 << 30
 
+_MOST_PNG_CHANNELS = 4
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _IHDR_END = 24
 """The first bytes of a PNG: signature 8, length and name of IHDR 8, width 4, height 4."""
@@ -42,7 +43,7 @@ def read_picture(path: StrPath, samples: Samples | None = None) -> Array:
     UnsupportedError
         A TIFF of a kind that `open_tiff` does not read.
     LimitError
-        More than 2^28 pixels.
+        More than 2^30 samples (4 GiB in memory).
     """
     try:
         with Path(path).open("rb") as file:
@@ -54,7 +55,7 @@ def read_picture(path: StrPath, samples: Samples | None = None) -> Array:
     if not start.startswith((b"II", b"MM")):
         raise InputError(f"{path}: neither a PNG nor a TIFF")
     with open_tiff(path, samples) as source:
-        _check_size(path, source.height, source.width)
+        _check_size(path, source.height, source.width, source.channels)
         picture = np.empty((source.height, source.width, source.channels), np.float32)
         for y0, x0, data in source.blocks():
             picture[y0 : y0 + data.shape[0], x0 : x0 + data.shape[1]] = data
@@ -63,7 +64,7 @@ def read_picture(path: StrPath, samples: Samples | None = None) -> Array:
 
 def _read_png(path: StrPath, start: bytes) -> Array:
     width, height = (int.from_bytes(start[i : i + 4], "big") for i in (16, 20))
-    _check_size(path, height, width)
+    _check_size(path, height, width, _MOST_PNG_CHANNELS)
     try:
         pixels = imagecodecs.png_decode(Path(path).read_bytes())
     except (RuntimeError, ValueError) as error:
@@ -72,6 +73,9 @@ def _read_png(path: StrPath, start: bytes) -> Array:
     return picture.reshape(height, width, -1)
 
 
-def _check_size(path: StrPath, height: int, width: int) -> None:
-    if height * width > MAX_PIXELS:
-        raise LimitError(f"{path}: {height} x {width} pixels, the limit for a map is {MAX_PIXELS} pixels")
+def _check_size(path: StrPath, height: int, width: int, channels: int) -> None:
+    if height * width * channels > MAX_SAMPLES:
+        raise LimitError(
+            f"{path}: {height} x {width} pixels with {channels} channels, the limit for a map is "
+            f"{MAX_SAMPLES} samples"
+        )

@@ -8,7 +8,7 @@ than the rectangle; a compressed segment can only be decoded as a whole, and one
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ MAX_CHANNELS = 256
 
 _DTYPES = ("u1", "u2", "f2", "f4", "f8")
 _PHOTOMETRICS = ("MINISBLACK", "RGB", "SEPARATED")
+_COMPRESSIONS = ("NONE", "LZW", "ADOBE_DEFLATE", "DEFLATE", "PACKBITS", "LZMA", "ZSTD")
 
 
 class TiffStorage:
@@ -84,8 +85,9 @@ class TiffStorage:
             self._grid = Grid(self.height, self.width, min(page.rowsperstrip, self.height), self.width)
         self._in_place = page.compression == 1 and page.predictor == 1 and page.fillorder == 1
         self.unit = (1, 1) if self._in_place else (self._grid.segment_height, self._grid.segment_width)
-        self._offsets: Sequence[int] = page.dataoffsets
-        self._counts: Sequence[int] = page.databytecounts
+        # A damaged file may have fractions here, which index refuses.
+        self._offsets = [index(offset) for offset in page.dataoffsets]
+        self._counts = [index(count) for count in page.databytecounts]
         self._check_segments()
 
     def _check_segments(self) -> None:
@@ -175,11 +177,14 @@ def _only_image(file: Any, path: StrPath) -> Any:
         raise InputError(f"{path}: the image is empty")
     if page.shaped[1] != 1:
         raise UnsupportedError(f"{path}: an image of {page.shaped[1]} slices, expected a flat one")
-    photometric = getattr(page.photometric, "name", page.photometric)
-    if photometric not in _PHOTOMETRICS:
-        raise UnsupportedError(
-            f"{path}: photometric interpretation {photometric}, supported are {', '.join(_PHOTOMETRICS)}"
-        )
+    for what, value, supported in (
+        ("photometric interpretation", page.photometric, _PHOTOMETRICS),
+        # Not the lossy ones: what they lose is measured for the eye, not for normals and roughness.
+        ("compression", page.compression, _COMPRESSIONS),
+    ):
+        name = getattr(value, "name", str(value))
+        if name not in supported:
+            raise UnsupportedError(f"{path}: {what} {name}, supported are {', '.join(supported)}")
     orientation = page.tags.valueof(274, 1)
     if orientation != 1:
         raise UnsupportedError(f"{path}: orientation {orientation}, supported is 1 (first row at the top)")
