@@ -191,13 +191,19 @@ def test_values():
     assert read(unhex(EXAMPLES["matf constants"][1])).matrix is None
 
 
-@pytest.mark.parametrize("encoding", range(4))
-def test_value_encodings(encoding):
-    values = np.array([0, 1, 128 / 255]) if encoding == 3 else np.array([0, 1, 0.5])
-    curve = SampledCurve(0, 1, 0, values, encoding)
+@pytest.mark.parametrize(
+    ("encoding", "stored"), [(0, 0.3), (1, 0.300048828125), (2, 19661 / 65535), (3, 77 / 255)]
+)
+def test_value_encodings(encoding, stored):
+    """0.3 in single precision is a little above 19660.5 / 65535 and 76.5 / 255; in half, 0.300048828125."""
+    curve = SampledCurve(0, 1, 0, [0, 1, 0.3], encoding)
+    np.testing.assert_array_equal(curve.values, np.float32([0, 1, stored]))
     found = read(CurveSet((curve,)).to_bytes()).curves[0]
-    np.testing.assert_allclose(found.values, values, atol=1e-5 if encoding == 2 else 1e-8)
+    np.testing.assert_array_equal(found.values, curve.values)
     assert len(curve.to_bytes()) == 24 + 3 * (4, 2, 2, 1)[encoding]
+    table = ExtendedClut([[0], [1], [0.3]], encoding)
+    np.testing.assert_array_equal(table.table, read(table.to_bytes()).table)
+    assert table.table[2, 0] == curve.values[2]
 
 
 def test_matrix_without_offsets():

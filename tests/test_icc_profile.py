@@ -99,8 +99,8 @@ def test_tags_as_a_mapping():
     assert profile["desc"] == Utf8("a")
     assert profile["desc"] is profile["desc"]
     assert profile.get("cprt") is None
-    with pytest.raises(MissingTagError, match=r"^a.icc: tag cprt is missing$"):
-        profile["cprt"]
+    with pytest.raises(MissingTagError, match=r"^a.icc: tag dsec is missing: did you mean 'desc'\?$"):
+        profile["dsec"]
     assert issubclass(MissingTagError, ProfileError)
 
 

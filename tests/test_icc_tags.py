@@ -206,6 +206,7 @@ def test_arrays_are_copies_and_read_only():
         (lambda: Mluc.of("a", language="eng"), "expected two characters each"),
         (lambda: Mluc(("a",)), "expected a LocalisedText"),
         (lambda: TagArray("utf8", ("a",)), "found str, expected a tag type"),
+        (lambda: TagArray("utf8", (Unknown("utf8", bytes(4), b""),)), "found Unknown, expected a tag type"),
     ],
 )
 def test_what_the_file_cannot_hold_is_refused(make, message):

@@ -21,7 +21,7 @@ from iccbrdf.icc.fields import (
     Repeat,
     Reserved,
     Sequential,
-    check_encodable,
+    encodable,
     tag_layout,
 )
 from iccbrdf.icc.layout import Field, Record, Registry
@@ -146,7 +146,7 @@ class SampledCurve(Record):
         _check_range(self.first, self.last)
         if self.values.ndim != 1 or len(self.values) < 2:
             raise ValueError(f"values: found shape {self.values.shape}, expected two or more in a row")
-        check_encodable(self.values, self.encoding)
+        object.__setattr__(self, "values", encodable(self.values, self.encoding))
 
 
 @CURVES.add("clcf")

@@ -24,7 +24,7 @@ from iccbrdf.icc.fields import (
     Floats,
     Positioned,
     Reserved,
-    check_encodable,
+    encodable,
     frozen,
     read_spans,
     tag_layout,
@@ -205,7 +205,7 @@ class ExtendedClut(_Table):
 
     def check(self) -> None:
         super().check()
-        check_encodable(self.table, self.encoding)
+        object.__setattr__(self, "table", encodable(self.table, self.encoding))
 
 
 @ELEMENTS.add("tint")
@@ -348,9 +348,10 @@ class MultiProcess(Record):
     )
 
     @classmethod
-    def of(cls, *elements: Any) -> MultiProcess:
-        """The tag of one element or more; its channel counts are theirs."""
-        return cls(elements[0].inputs, elements[-1].outputs, elements)
+    def of(cls, first: Any, *others: Any) -> MultiProcess:
+        """The tag of these elements; its channel counts are theirs."""
+        elements = (first, *others)
+        return cls(first.inputs, elements[-1].outputs, elements)
 
     def check(self) -> None:
         channels = self.inputs

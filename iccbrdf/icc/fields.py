@@ -30,7 +30,7 @@ def frozen(values: Any, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
     else:
         lost = array != given
     if lost.any():
-        raise ValueError(f"found {given[lost].flat[0]}, which {array.dtype} cannot hold")
+        raise ValueError(f"found {given[lost].flat[0]}, which {array.dtype.name} cannot hold")
     array.setflags(write=False)
     return array
 
@@ -262,13 +262,14 @@ class Floats(FieldType):
         return frozen(value, np.float32)
 
 
-def check_encodable(values: FloatArray, encoding: int) -> None:
-    """ValueError where `values` hold a number that the value encoding cannot store."""
-    _, scale = ENCODINGS[encoding]
-    if scale > 1 and not ((values >= 0) & (values <= 1)).all():
-        raise ValueError(f"found values outside 0..1, expected none for value encoding {encoding}")
-    if encoding == 1:
-        frozen(values, np.float16)
+def encodable(values: FloatArray, encoding: int) -> FloatArray:
+    """`values` as value encoding `encoding` gives them back; ValueError where they are out of its range."""
+    dtype, scale = ENCODINGS[encoding]
+    if scale > 1:
+        if not ((values >= 0) & (values <= 1)).all():
+            raise ValueError(f"found values outside 0..1, expected none for value encoding {encoding}")
+        return frozen(np.rint(values.astype(np.float64) * scale).astype(np.float32) / np.float32(scale), "f4")
+    return frozen(frozen(values, dtype), np.float32)
 
 
 class Embedded(FieldType):

@@ -207,8 +207,8 @@ class Registry:
         return cls.read(reader)
 
     def check(self, value: object) -> Any:
-        """`value`, which must be of a class that this registry reads back; else ValueError."""
-        classes = {*self.classes.values(), *([self.unknown] if self.unknown else [])}
-        if type(value) not in classes:
+        """`value`; ValueError where it is no record that this registry reads back as the same class."""
+        found = isinstance(value, Record) and self.classes.get(value.signature, self.unknown)
+        if found is not type(value):
             raise ValueError(f"found {type(value).__name__}, expected a {self.kind}")
         return value

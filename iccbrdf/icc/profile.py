@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from iccbrdf.errors import InputError, LimitError, ProfileError, UnsupportedError, UsageError
+from iccbrdf.errors import InputError, LimitError, ProfileError, UnsupportedError, UsageError, nearest
 from iccbrdf.files import atomic_output
 from iccbrdf.icc.elements import MultiProcess
 from iccbrdf.icc.header import SIZE, Header, channel_count
@@ -129,9 +129,7 @@ class Profile(Mapping[str, Any]):
 
     def __getitem__(self, signature: str) -> Any:
         """The tag's record.  Raises MissingTagError (a ProfileError and a KeyError), ProfileError."""
-        if signature not in self._tags:
-            raise MissingTagError(f"{self.source}: tag {shown(signature)} is missing")
-        value = self._tags[signature].value
+        value = self._tag(signature).value
         if problem := self._contradiction(signature, value):
             raise ProfileError(f"{self.source}: tag {shown(signature)}: {problem}")
         return value
@@ -169,15 +167,18 @@ class Profile(Mapping[str, Any]):
 
     def tag_data(self, signature: str) -> bytes:
         """The bytes of a tag as they are, or will be, in the file, its type signature included."""
-        if signature not in self._tags:
-            raise MissingTagError(f"{self.source}: tag {shown(signature)} is missing")
-        return bytes(self._tags[signature].data)
+        return bytes(self._tag(signature).data)
 
     def tag_offset(self, signature: str) -> int | None:
         """Where the tag's data begins in the file that was read; None for a tag made in memory."""
+        return self._tag(signature).offset
+
+    def _tag(self, signature: str) -> _Stored | _Made:
         if signature not in self._tags:
-            raise MissingTagError(f"{self.source}: tag {shown(signature)} is missing")
-        return self._tags[signature].offset
+            raise MissingTagError(
+                f"{self.source}: tag {shown(signature)} is missing: {nearest(signature, self._tags)}"
+            )
+        return self._tags[signature]
 
     def replace(
         self,
