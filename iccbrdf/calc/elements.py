@@ -208,3 +208,6 @@ _FUNCTIONS: Mapping[str, Callable[[Any, Sequence[Value], Environment], list[Valu
     "tint": _tint,
     "calc": _calculator,
 }
+
+SIGNATURES = tuple(_FUNCTIONS)
+"""Signatures of the elements that `apply` can evaluate."""

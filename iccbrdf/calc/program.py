@@ -127,7 +127,7 @@ def _nest(program: Program, where: str, start: int, end: int, level: int) -> Blo
             if head.operand > end - body:
                 raise ProfileError(
                     f"{where}: op {position}: the {head.name!r} block has {head.operand} operations,"
-                    f" expected at most the {end - body} left in the block around it"
+                    f" expected at most {end - body}, what is left of the block around it"
                 )
             blocks.append(_nest(program, where, body, body + head.operand, level + 1))
             body += head.operand
@@ -254,7 +254,7 @@ class _Parser:
             else:
                 ops.append(self._op(self.token))
                 self._advance()
-        if level == 0 and self._at("{"):
+        if self._at("{"):
             raise self._error("found '{', expected an operator or a number")
         return ops
 

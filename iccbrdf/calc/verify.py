@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 from iccbrdf.calc.operators import OPERATORS, Element, Operand, stack_effect
 from iccbrdf.calc.program import MAX_NESTING, Block, Program, Step, nest, signature_name, written
@@ -18,6 +18,9 @@ MAX_CALCULATORS = 32
 """Calculators inside calculators."""
 MAX_EXECUTED = 1 << 24
 """Operations for one pixel: calculators that apply others twice could ask for 2^32 from a small file."""
+
+MAX_SAMPLES = 1 << 20
+"""Samples of a calculator curve, whose stored size may be anything."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,8 @@ def verify(
     temporaries and sub-elements out of range or of the wrong kind; broken blocks; an empty program.
     `where` names the program's place for messages.
 
-    Raises ProfileError (operation, what was found, what was expected), and LimitError for nesting and
-    running time beyond MAX_NESTING, MAX_CALCULATORS and MAX_EXECUTED.
+    Raises ProfileError (operation, what was found, what was expected), and LimitError for nesting, running
+    time and curve samples beyond MAX_NESTING, MAX_CALCULATORS, MAX_EXECUTED and MAX_SAMPLES.
     """
     return _verify(program, n_in, n_out, elements, where, 0, {})
 
@@ -65,25 +68,29 @@ def verify_element(element: Element, *, where: str = "element") -> tuple[Checked
     return _verify_element(element, where, 0, {})
 
 
-_Known = dict[int, tuple[Checked, ...]]
-"""Elements that are checked already, by id: a file may share one a thousand times."""
-
+# Elements that are checked already, by id: a file may share one a thousand times.
+_Known: TypeAlias = dict[int, tuple[Checked, ...]]
 
 def _verify_element(element: Element, where: str, level: int, known: _Known) -> tuple[Checked, ...]:
     if id(element) not in known:
         known[id(element)] = tuple(
             _verify(c.program, c.inputs, c.outputs, c.elements, where, level, known)
-            for c in _calculators(element)
+            for c in _calculators(element, where)
         )
     return known[id(element)]
 
 
-def _calculators(element: Any) -> list[Any]:
+def _calculators(element: Any, where: str) -> list[Any]:
+    """The calculators that an element is or holds."""
     if element.signature == "calc":
         return [element]
-    if element.signature == "cvst":
-        return [curve.calculator for curve in element.curves if curve.signature == "clcf"]
-    return []
+    if element.signature != "cvst":
+        return []
+    curves = [curve for curve in element.curves if curve.signature == "clcf"]
+    for curve in curves:
+        if curve.size > MAX_SAMPLES:
+            raise LimitError(f"{where}: {curve.size} samples of a curve, expected at most {MAX_SAMPLES}")
+    return [curve.calculator for curve in curves]
 
 
 def _verify(
