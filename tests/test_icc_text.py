@@ -65,3 +65,8 @@ def test_a_malformed_tag_is_shown_as_such():
     assert to_dict(profile)["tags"]["desc"]["error"].startswith("a.icc: tag desc (utf8): byte offset 164: ")
     assert to_dict(profile)["tags"]["cprt"]["text"] == "b"
     assert "error" in describe(profile)
+
+
+def test_text_from_a_profile_moves_no_terminal():
+    profile = Profile(Header(device_class="mid "), {"desc": Utf8("a\x1b[2J\nb")})
+    assert "    text              'a\\x1b[2J\\nb'" in describe(profile).splitlines()

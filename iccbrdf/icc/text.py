@@ -107,7 +107,8 @@ def _number(value: Any) -> Any:
 
 
 def _lines(data: dict[str, Any], indent: str) -> Iterator[str]:
-    for name, value in data.items():
+    for key, value in data.items():
+        name = _printable(key)
         if isinstance(value, dict):
             yield f"{indent}{name}"
             yield from _lines(value, indent + "  ")
@@ -118,6 +119,12 @@ def _lines(data: dict[str, Any], indent: str) -> Iterator[str]:
                     yield f"{indent}  [{index}]"
                     yield from _lines(item, indent + "    ")
                 else:
-                    yield f"{indent}  {item}"
+                    yield f"{indent}  {_printable(item)}"
         else:
-            yield f"{indent}{name:<18}{value}"
+            yield f"{indent}{name:<18}{_printable(value)}"
+
+
+def _printable(value: Any) -> str:
+    """`value` as text that keeps to its line and moves no terminal, whatever a profile holds."""
+    text = str(value)
+    return text if text.isprintable() else repr(text)
