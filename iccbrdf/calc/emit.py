@@ -15,15 +15,17 @@ Only operators that all implementations have are written, and no empty `else` (i
 from __future__ import annotations
 
 import math
-import struct
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+import numpy as np
+
 from iccbrdf.calc.graph import Graph, Node, is_elementwise, needed_by, takes
 from iccbrdf.calc.operators import OPERATORS, Kind, Operand
 from iccbrdf.calc.program import Op, Program
+from iccbrdf.errors import LimitError
 
 _BY_SCALAR = {"add": "sadd", "sub": "ssub", "mul": "smul", "div": "sdiv", "pow": "gama"}
 """Operators of a vector and one scalar, by the operator whose second operand would repeat it."""
@@ -81,27 +83,31 @@ def operator(name: str, *operands: int) -> Op:
     """An operator of the table with the operands of its text form, `operator("sum", 3)` for `sum(3)`."""
     kind = OPERATORS[name].operand
     first, second = (*operands, 0, 0)[:2]
-    if kind is Operand.COUNT:
-        return Op(name, (first - 1) << 16)
-    if kind is Operand.COUNT_FROM_TWO:
-        return Op(name, (first - 2) << 16)
-    if kind is Operand.PAIR:
-        return Op(name, (first - 1) << 16 | (second - 1))
-    if kind is Operand.RANGE:
-        return Op(name, first << 16 | (second - 1))
-    return Op(name, first)
+    stored = {
+        Operand.COUNT: (first - 1, 0),
+        Operand.COUNT_FROM_TWO: (first - 2, 0),
+        Operand.PAIR: (first - 1, second - 1),
+        Operand.RANGE: (first, second - 1),
+    }.get(kind)
+    if stored is None:
+        return Op(name, first)
+    s, t = stored
+    if not (0 <= s <= 0xFFFF and 0 <= t <= 0xFFFF):
+        raise LimitError(f"{name}{operands}: a program has no room for vectors or temporaries of this size")
+    return Op(name, s << 16 | t)
 
 
 def number(value: float) -> Op:
     """The operator that pushes a constant, rounded to float32 here and nowhere else."""
     if value == math.pi:
         return Op("pi")
-    if math.isnan(value):
+    with np.errstate(over="ignore"):
+        rounded = np.float32(value)
+    if np.isnan(rounded):
         return Op("NaN")
-    try:
-        return Op("data", int.from_bytes(struct.pack(">f", value), "big"))
-    except OverflowError:
-        return Op("+INF" if value > 0 else "-INF")
+    if np.isinf(rounded):
+        return Op("+INF" if rounded > 0 else "-INF")
+    return Op("data", int(rounded.view(np.uint32)))
 
 
 # Walking the graph -------------------------------------------------------------------------------------
@@ -139,12 +145,12 @@ class _Emitter:
         fresh: list[Node] = []
         while waiting:
             group = self._group(waiting)
-            saved = self._is_new(group[0])
-            if fresh and not (saved and self._independent(group, fresh)):
+            if fresh and not (self._is_new(group[0]) and self._independent(group, fresh)):
                 self._store("tsav", fresh)
                 fresh = []
-                # What was just saved may change what can be computed together.
+                # What was just saved is read now, and may change what can be computed together.
                 group = self._group(waiting)
+            saved = self._is_new(group[0])
             yield self._compute(group)
             if saved:
                 fresh.extend(group)

@@ -83,6 +83,7 @@ def lower(
     template: Template,
     constants: Mapping[str, float | Sequence[float] | str],
     effects: Mapping[str, bool],
+    variables: Mapping[str, float],
 ) -> Lowered:
     """
     Return the graph of a template.
@@ -96,13 +97,15 @@ def lower(
         choices (names).
     effects
         Switches that differ from the template's own settings.
+    variables
+        Values of run-time variables where they are undefined, which replace the defaults.
 
     Raises
     ------
     InputError
         Names that are not declared, widths that do not fit, at their place in the template.
     """
-    return _Lowering(template, constants, effects).run()
+    return _Lowering(template, constants, effects, variables).run()
 
 
 @dataclass(frozen=True)
@@ -128,10 +131,12 @@ class _Lowering:
         template: Template,
         constants: Mapping[str, float | Sequence[float] | str],
         effects: Mapping[str, bool],
+        variables: Mapping[str, float],
     ) -> None:
         self._template = template
         self._constants = constants
         self._effects = effects
+        self._variables = variables
         self._result = Lowered()
         self._graph = self._result.graph
         self._globals: dict[str, Node] = {"pi": self._graph.const(math.pi)}
@@ -160,7 +165,12 @@ class _Lowering:
         statements = list(self._template.all_statements())
         constants = [s.name for s in statements if isinstance(s, Constant | Choice)]
         effects = [s.name for s in statements if isinstance(s, Effect)]
-        settings = (("constant", self._constants, constants), ("effect", self._effects, effects))
+        variables = [v.name for s in statements if isinstance(s, Runtime) for v in s.variables]
+        settings = (
+            ("constant", self._constants, constants),
+            ("effect", self._effects, effects),
+            ("run-time variable", self._variables, variables),
+        )
         for what, given, declared in settings:
             for name in given:
                 if name not in declared:
@@ -254,8 +264,9 @@ class _Lowering:
         default = self._known(declared.default, f"the default of {name}")
         if len(default) != 1:
             raise declared.place.error(f"the default of {name} has {len(default)} components, expected 1")
-        self._result.variables[name] = default[0]
-        return self._graph.env(name, default[0])
+        value = float(self._variables.get(name, default[0]))
+        self._result.variables[name] = value
+        return self._graph.env(name, value)
 
     def _constant(self, declared: Constant) -> Node:
         name = declared.name
