@@ -16,14 +16,17 @@ from iccbrdf.icc import Matrix, MultiProcess
 def without_decoding(stage: Stage) -> Stage:
     """`stage` less its leading matrix: real values enter where the device values would have become real.
 
-    Raises LinkError where the profile does not begin with such a matrix.
+    A stage that starts from no device space, or has no elements, takes real values already.  Raises LinkError
+    where the profile begins with anything else than such a matrix.
     """
     elements = stage.process.elements
-    inputs = single_inputs(elements[0]) if elements else None
+    if stage.source.kind != "device" or not elements:
+        return stage
+    inputs = single_inputs(elements[0])
     if inputs is None:
         raise LinkError(
             f"{stage.where}: real samples need a profile that first decodes its device channels by a matrix, "
-            f"one channel a row; found {elements[0].signature if elements else 'no element'}"
+            f"one channel a row; found {elements[0].signature!r}"
         )
     names = tuple(stage.source.names[i] for i in inputs)
     return replace(
@@ -39,9 +42,11 @@ def arranged(stage: Stage, names: tuple[str, ...]) -> tuple[list[Step], Stage]:
     Raises LinkError for a name that the profile does not have, and for a missing one that it cannot spare.
     """
     own = stage.source.names
+    if not names:
+        raise LinkError(f"no channels are named, expected some of {', '.join(own)}")
     for i, name in enumerate(names):
         if name not in own:
-            raise LinkError(f"channel {name!r} is not in {stage.profile.source}: {nearest(name, own)}")
+            raise LinkError(f"channel {name!r} is not in {stage.profile.source}: {nearest(str(name), own)}")
         if name in names[:i]:
             raise LinkError(f"channel {name!r} comes twice")
     if names == own:

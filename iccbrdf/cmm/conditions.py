@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from iccbrdf.errors import LinkError, ProfileError
@@ -30,32 +32,37 @@ _STANDARD: tuple[object, ...] = ("D50", "CIE 1931")
 
 def conditions(profile: Profile) -> Conditions:
     """The connection conditions that `profile` states (spectralViewingConditionsTag, else its header)."""
-    if profile.header.version[0] < 5:
-        return Conditions(_STANDARD, D50)
     svcn = profile.get("svcn")
     if svcn is None:
-        white = profile.header.illuminant
-        # A MID or a v4 style profile may leave the header's illuminant zero: nothing is stated there.
-        if not any(white) or max(abs(a - b) for a, b in zip(white, D50, strict=True)) < 5e-4:
+        stated = profile.header.illuminant
+        # All zeros state nothing.
+        if not any(stated) or max(abs(a - b) for a, b in zip(stated, D50, strict=True)) < 5e-4:
             return Conditions(_STANDARD, D50)
+        white = _normalised(stated, f"{profile.source}: header: illuminant")
         return Conditions(("header illuminant", *white), white)
     if not isinstance(svcn, ViewingConditions):
         raise ProfileError(
             f"{profile.source}: tag svcn: found type {svcn.signature!r}, expected spectral viewing conditions"
         )
-    x, y, z = (float(v) for v in svcn.illuminant_XYZ)
-    if not y > 0:
-        raise ProfileError(f"{profile.source}: tag svcn: the illuminant's luminance is {y}, expected above 0")
-    white = (x / y, 1.0, z / y)
+    white = _normalised(svcn.illuminant_XYZ, f"{profile.source}: tag svcn: illuminant")
     if svcn.observer == 1 and svcn.illuminant == 1:
         return Conditions(_STANDARD, D50)
-    observer: object = svcn.observer_table.tobytes() if svcn.observer == 0 else svcn.observer
+    observer: tuple[object, ...] = (svcn.observer,)
+    if svcn.observer == 0:
+        observer += (*svcn.observer_range, svcn.observer_table.tobytes())
     illuminant: tuple[object, ...] = (svcn.illuminant,)
     if svcn.illuminant == 0:
-        illuminant += (svcn.spd.tobytes(), *white)
+        illuminant += (*svcn.illuminant_range, svcn.spd.tobytes(), *white)
     elif svcn.illuminant in _BY_TEMPERATURE:
         illuminant += (svcn.cct,)
-    return Conditions((observer, *illuminant), white)
+    return Conditions((*observer, *illuminant), white)
+
+
+def _normalised(XYZ: Iterable[float], place: str) -> tuple[float, float, float]:
+    x, y, z = XYZ
+    if not all(math.isfinite(v) and v > 0 for v in (x, y, z)):
+        raise ProfileError(f"{place}: found XYZ {x:g} {y:g} {z:g}, expected finite numbers above 0")
+    return x / y, 1.0, z / y
 
 
 def conversions(source: Profile, destination: Profile) -> list[tuple[str, MultiProcess]]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
+
+import numpy as np
 
 from iccbrdf.errors import VariableError, nearest
 
 RESERVED = ("true", "ndef")
 """Signatures that ICC.2 itself defines: always 1, never defined."""
+
+_LARGEST = float(np.finfo(np.float32).max)
 
 
 def checked_environment(env: Mapping[str, float], variables: Iterable[str]) -> dict[str, float]:
@@ -18,13 +21,15 @@ def checked_environment(env: Mapping[str, float], variables: Iterable[str]) -> d
     for name, value in env.items():
         if name not in variables:
             raise VariableError(
-                f"run-time variable {name!r} is read by none of the profiles: {nearest(name, variables)}"
+                f"run-time variable {name!r} is read by none of the profiles: {nearest(str(name), variables)}"
             )
         try:
             number = float(value)
-        except (TypeError, ValueError):
-            number = math.nan
-        if not math.isfinite(number):
-            raise VariableError(f"run-time variable {name!r}: found {value!r}, expected a finite number")
+        except (TypeError, ValueError, OverflowError):
+            number = np.nan
+        if not abs(number) <= _LARGEST:
+            raise VariableError(
+                f"run-time variable {name!r}: found {value!r}, expected a finite number (float32)"
+            )
         checked[name] = number
     return checked

@@ -13,6 +13,7 @@ _DEFAULT_TYPES = ("ui08", "ui16", "fl16", "fl32", "fl64")
 
 
 def join(before: Stage, after: Stage, *, absolute: bool) -> list[Step]:
+    """The steps from the end of `before` to the start of `after`; LinkError where they do not fit."""
     here, there = before.destination, after.source
     if here.kind != there.kind:
         raise LinkError(
@@ -20,24 +21,39 @@ def join(before: Stage, after: Stage, *, absolute: bool) -> list[Step]:
         )
     if here.kind == "mcs":
         return _routing(before, after)
-    if here.kind == "device":
-        if here.signature != there.signature:
-            raise LinkError(
-                f"{before.profile.source} gives {here.text}, but {after.profile.source} takes {there.text}"
-            )
+    if here.kind == "pcs":
+        return [
+            *media_white(before, absolute, outward=True),
+            *_connection(before, after),
+            *media_white(after, absolute, outward=False),
+        ]
+    if here.signature != there.signature:
+        raise LinkError(
+            f"{before.profile.source} gives {here.text}, but {after.profile.source} takes {there.text}"
+        )
+    return []
+
+
+def _connection(before: Stage, after: Stage) -> list[Step]:
+    """From one colorimetric connection space to the other; a change of conditions is done on XYZ."""
+    here, there = before.destination.signature, after.source.signature
+    steps: list[Step] = [Process.checked(p, place) for place, p in conversions(before.profile, after.profile)]
+    if here == there and not steps:
         return []
-    steps = media_white(before, absolute, outward=True)
-    if here.signature == "Lab ":
-        steps.append(LabToXYZ(conditions(before.profile).white))
-    steps += [Process.checked(p, origin) for origin, p in conversions(before.profile, after.profile)]
-    if there.signature == "Lab ":
+    if here == "Lab ":
+        steps.insert(0, LabToXYZ(conditions(before.profile).white))
+    if there == "Lab ":
         steps.append(XYZToLab(conditions(after.profile).white))
-    return steps + media_white(after, absolute, outward=False)
+    return steps
 
 
 def media_white(stage: Stage, absolute: bool, *, outward: bool) -> list[Step]:
-    """The step between the tag's own colorimetry and the one asked for; Lab is scaled by way of XYZ."""
-    if stage.absolute == absolute or stage.tag[-1] not in "13":
+    """The step between the tag's own colorimetry and the one asked for; Lab is scaled by way of XYZ.
+
+    Only the colorimetric tags, ...1 and ...3, relate to the media white.  A ...0 or ...2 that stands in for
+    one of them is used as it is, as the reference implementation does at the end of a chain.
+    """
+    if stage.tag[-1] not in "13" or (stage.tag[-1] == "3") == absolute:
         return []
     space = stage.destination if outward else stage.source
     white, medium = conditions(stage.profile).white, stage.profile.get("wtpt")

@@ -73,6 +73,8 @@ def link(
     UsageError
         An argument has no such value.
     """
+    if isinstance(profiles, (str, os.PathLike, Profile)):
+        raise UsageError("profiles: found a single one, expected a sequence, such as [mid, mvis]")
     chain = [p if isinstance(p, Profile) else read_profile(p) for p in profiles]
     if not chain:
         raise UsageError("no profile to link")
@@ -94,6 +96,8 @@ def link(
     steps: list[Step] = []
     if channels is not None:
         steps, first = arranged(first, tuple(channels))
+    if first.source.kind == "pcs":
+        steps += media_white(first, absolute, outward=False)
     steps.append(first.step())
     for before, after in pairwise([first, *others]):
         steps += [*join(before, after, absolute=absolute), after.step()]
@@ -115,10 +119,11 @@ def link(
 
 
 def _number_type(dtype: npt.DTypeLike) -> type[np.floating[Any]]:
+    try:
+        found = np.dtype(dtype).type
+    except (TypeError, ValueError):  # no type at all
+        found = None
     for number_type in _NUMBER_TYPES:
-        try:
-            if np.dtype(dtype) == number_type:
-                return number_type
-        except TypeError:  # no type at all
-            break
+        if found is number_type:
+            return number_type
     raise UsageError(f"dtype {dtype!r} is unknown: valid are float32 and float64")

@@ -51,9 +51,10 @@ def mcs_space(profile: Profile) -> Space:
     """The multiplex channel space, whose names stand in the tag mcta."""
     signature = profile.header.mcs
     count = channel_count(signature)
-    if not signature.startswith("mc") or count is None:
+    if not signature.startswith("mc") or not count:
         raise ProfileError(
-            f"{profile.source}: header: multiplex space {signature!r}, expected mc and four hex digits"
+            f"{profile.source}: header: multiplex space {signature!r}, expected mc and four hex digits, "
+            "at least one channel"
         )
     names = profile.get("mcta")
     if names is None:
@@ -84,7 +85,7 @@ def device_space(profile: Profile, field: str = "colour_space") -> Space:
     if signature in _NAMES:
         return Space("device", signature, _NAMES[signature])
     count = channel_count(signature)
-    if count is None:
+    if not count:
         raise UnsupportedError(f"{profile.source}: header: device space {signature!r} is not known")
     return Space("device", signature, _decoded_names(profile, count) or tuple(map(str, range(1, count + 1))))
 

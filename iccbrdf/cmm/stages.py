@@ -19,6 +19,9 @@ INTENTS = ("perceptual", "relative", "saturation", "absolute")
 _PREFERENCE = {0: (0, 1, 3, 2), 1: (1, 3, 0, 2), 2: (2, 0, 1, 3), 3: (3, 1, 0, 2)}
 _BY_THE_BOOK = {0: (0,), 1: (1, 3, 0), 2: (2, 0), 3: (3, 1, 0)}
 
+_CANNOT_RUN = ("M2S", "D2B", "B2D", "rTRC", "kTRC")
+"""Tags that may hold a profile's only transform, where it is a spectral one or no processing elements."""
+
 
 @dataclass(frozen=True)
 class Stage:
@@ -29,8 +32,6 @@ class Stage:
     process: MultiProcess
     source: Space
     destination: Space
-    absolute: bool
-    """Whether its colorimetric side is absolute (a ...3 tag) rather than relative to the media white."""
 
     @property
     def where(self) -> str:
@@ -59,28 +60,24 @@ def _stage(profile: Profile, before: Space | None, following: str, intent: int) 
         raise UnsupportedError(
             f"{profile.source}: version {profile.header.version[0]}; only version 5 profiles link here"
         )
-    to_mcs = device_class == "mid " or (
-        profile.header.mcs and "A2M0" in profile and following in ("mvis", "mlnk")
-    )
-    if to_mcs:
+    to_mcs = profile.header.mcs and "A2M0" in profile and following in ("mvis", "mlnk")
+    if device_class == "mid " or to_mcs:
         tag, source, destination = "A2M0", device_space(profile), mcs_space(profile)
     elif device_class == "mvis":
-        tag, source, destination = (
-            _by_intent(profile, ("M2B",), intent),
-            mcs_space(profile),
-            pcs_space(profile),
-        )
+        tag = _by_intent(profile, ("M2B",), intent)
+        source, destination = mcs_space(profile), pcs_space(profile)
     elif device_class == "mlnk":
         tag, source, destination = "M2A0", mcs_space(profile), device_space(profile)
     elif device_class == "link":
         tag, source, destination = "A2B0", device_space(profile), device_space(profile, field="pcs")
     elif device_class == "abst":
-        tag, source, destination = _by_intent(profile, ("D2B", "A2B"), intent), *(pcs_space(profile),) * 2
+        tag = _by_intent(profile, _families(profile, "D2B", "A2B"), intent)
+        source = destination = pcs_space(profile)
     elif before is not None and before.kind == "pcs":
-        tag = _by_intent(profile, ("B2D", "B2A"), intent)
+        tag = _by_intent(profile, _families(profile, "B2D", "B2A"), intent)
         source, destination = pcs_space(profile), device_space(profile)
     else:
-        tag = _by_intent(profile, ("D2B", "A2B"), intent)
+        tag = _by_intent(profile, _families(profile, "D2B", "A2B"), intent)
         source, destination = device_space(profile), pcs_space(profile)
     process = _multi_process(profile, tag)
     for side, space, found in (("in", source, process.inputs), ("out", destination, process.outputs)):
@@ -89,12 +86,17 @@ def _stage(profile: Profile, before: Space | None, following: str, intent: int) 
                 f"{profile.source}: tag {tag} has {found} channels {side}, "
                 f"expected {len(space.names)} by the header ({space.text})"
             )
-    return Stage(profile, tag, process, source, destination, absolute=tag.endswith("3"))
+    return Stage(profile, tag, process, source, destination)
+
+
+def _families(profile: Profile, direct: str, colorimetric: str) -> tuple[str, ...]:
+    """The tags `direct` come first, but with a spectral connection space they hold for that one."""
+    return (colorimetric,) if profile.header.spectral_pcs else (direct, colorimetric)
 
 
 def _by_intent(profile: Profile, families: tuple[str, ...], intent: int) -> str:
-    for family in families:
-        for n in _PREFERENCE[intent]:
+    for n in _PREFERENCE[intent]:
+        for family in families:
             tag = f"{family}{n}"
             if tag not in profile:
                 continue
@@ -106,8 +108,9 @@ def _by_intent(profile: Profile, families: tuple[str, ...], intent: int) -> str:
                 )
             return tag
     wanted = " or ".join(f"{family}0..3" for family in families)
-    if "M2S0" in profile:
-        raise UnsupportedError(f"{profile.source}: only spectral transforms (M2S), which cannot run yet")
+    for tag in profile:
+        if tag.startswith(_CANNOT_RUN):
+            raise UnsupportedError(f"{profile.source}: found tag {tag}, which cannot run; expected {wanted}")
     raise ProfileError(f"{profile.source}: none of the tags {wanted} is there")
 
 

@@ -11,7 +11,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from iccbrdf.calc import elements as calc_elements
+from iccbrdf.calc.elements import SIGNATURES
+from iccbrdf.calc.elements import apply as apply_element
 from iccbrdf.calc.verify import verify_element
 from iccbrdf.cmm.environment import RESERVED
 from iccbrdf.errors import ProfileError, UnsupportedError, nearest
@@ -36,34 +37,42 @@ class Process:
     variables: tuple[str, ...]
     """Run-time variables that the calculators among them read."""
 
+    registers: int
+    """An upper bound of the values that a pixel needs at a time."""
+
     @classmethod
     def checked(cls, process: MultiProcess, origin: str) -> Process:
-        """After the checks that make it safe to run: counts pass on from element to element, sound programs.
+        """After the checks that make it safe to run: elements that are known here, sound programs.
 
         Raises ProfileError, LimitError or UnsupportedError.
         """
-        width = process.inputs
         variables: set[str] = set()
+        registers = process.inputs
         for i, element in enumerate(process.elements):
-            place = f"{origin}: element {i} ({element.signature})"
-            if element.inputs != width:
-                raise ProfileError(f"{place} has {element.inputs} channels in, expected {width}")
-            if element.signature not in calc_elements._FUNCTIONS:
-                raise UnsupportedError(
-                    f"{place} cannot run: {nearest(element.signature, calc_elements._FUNCTIONS)}"
-                )
-            variables.update(*(c.environment for c in verify_element(element, where=place)))
-            width = element.outputs
-        if width != process.outputs:
-            raise ProfileError(
-                f"{origin}: the last element gives {width} channels, expected {process.outputs}"
-            )
-        return cls(origin, process.elements, tuple(sorted(variables.difference(RESERVED))))
+            place = f"{origin}: element {i}"
+            _check_runnable(element, place)
+            programs = verify_element(element, where=f"{place} ({element.signature})")
+            variables.update(*(p.environment for p in programs))
+            registers = max(registers, element.outputs, *(p.max_depth + p.temporaries for p in programs))
+        return cls(origin, process.elements, tuple(sorted(variables.difference(RESERVED))), registers)
 
     def apply(self, channels: Sequence[Channel], env: Mapping[str, float], dtype: Any) -> list[Channel]:
         for element in self.elements:
-            channels = calc_elements.apply(element, channels, env=env, dtype=dtype)
+            channels = apply_element(element, channels, env=env, dtype=dtype)
         return list(channels)
+
+
+def _check_runnable(element: Any, place: str) -> None:
+    """Is every element known here, those inside of calculators too, and does it have channels?"""
+    place = f"{place} ({element.signature})"
+    if element.signature not in SIGNATURES:
+        raise UnsupportedError(f"{place} cannot run: {nearest(element.signature, SIGNATURES)}")
+    if not element.inputs or not element.outputs:
+        raise ProfileError(
+            f"{place} has {element.inputs} channels in and {element.outputs} out, expected at least one"
+        )
+    for i, inner in enumerate(getattr(element, "elements", ())):
+        _check_runnable(inner, f"{place}, sub-element {i}")
 
 
 @dataclass(frozen=True)

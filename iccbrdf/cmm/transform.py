@@ -11,11 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from iccbrdf.cmm.environment import checked_environment
-from iccbrdf.cmm.steps import Step
+from iccbrdf.cmm.steps import Process, Step
 from iccbrdf.errors import InputError
 
 TILE = 16384
 """Pixels a tile: the registers of a Cook-Torrance program on float32 tiles of this size stay within L2."""
+MAX_VALUES = 1 << 24
+"""Values of a tile at a time: programs may ask for so many registers that fewer pixels must do."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,15 @@ class Transform:
     threads: int
 
     def __call__(self, array: npt.ArrayLike) -> npt.NDArray[np.floating[Any]]:
-        """`array` (..., channels in) through the chain; raises InputError where the channels do not fit."""
-        pixels = np.asarray(array)
+        """`array` (..., channels in) through the chain, in the dtype of the transform.
+
+        Integers are taken as the numbers that they are: 255 is not 1.  Raises InputError where the array
+        holds no real numbers or the channels do not fit.
+        """
+        try:
+            pixels = np.asarray(array)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"the array cannot be read: {error}") from None
         if pixels.dtype.kind not in "fiu":
             raise InputError(f"the array holds {pixels.dtype}, expected real numbers")
         if pixels.ndim == 0 or pixels.shape[-1] != len(self.channels_in):
@@ -50,10 +59,11 @@ class Transform:
             )
         flat = pixels.reshape(-1, len(self.channels_in))
         out = np.empty((len(flat), len(self.channels_out)), self.dtype)
-        starts = range(0, len(flat), TILE)
+        size = self._tile_size()
+        starts = range(0, len(flat), size)
 
         def tile(start: int) -> None:
-            self._run(flat[start : start + TILE], out[start : start + TILE])
+            self._run(flat[start : start + size], out[start : start + size])
 
         if self.threads > 1 and len(starts) > 1:
             with ThreadPoolExecutor(self.threads) as pool:
@@ -64,12 +74,16 @@ class Transform:
         return out.reshape(*pixels.shape[:-1], len(self.channels_out))
 
     def _run(self, pixels: npt.NDArray[Any], out: npt.NDArray[Any]) -> None:
-        channels: list[Any] = list(np.ascontiguousarray(pixels.T, self.dtype))
         with np.errstate(all="ignore"):
+            channels: list[Any] = list(np.ascontiguousarray(pixels.T, self.dtype))
             for step in self.steps:
                 channels = step.apply(channels, self.env, self.dtype)
         for i, channel in enumerate(channels):
             out[:, i] = channel
+
+    def _tile_size(self) -> int:
+        registers = max((step.registers for step in self.steps if isinstance(step, Process)), default=1)
+        return max(1, min(TILE, MAX_VALUES // registers))
 
     def with_env(self, env: Mapping[str, float]) -> Transform:
         """The same chain under other run-time variables; those not named keep their value."""
