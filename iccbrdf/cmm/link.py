@@ -61,6 +61,7 @@ def link(
     samples
         `device`: input is 0..1, as the first profile's device space.  `real`: input is what the device
         values stand for (signed normals, physical parameters); the profile's leading matrix is left out.
+        A first profile that starts from multiplex channels or XYZ takes real values in either case.
 
     Raises
     ------
@@ -91,7 +92,7 @@ def link(
 
     absolute = intent == "absolute"
     first, *others = stages(chain, intent)
-    if samples == "real":
+    if samples == "real" and first.source.kind == "device":
         first = without_decoding(first)
     steps: list[Step] = []
     if channels is not None:
@@ -109,6 +110,7 @@ def link(
     return Transform(
         channels_in=tuple(channels) if channels is not None else first.source.names,
         channels_out=last.destination.names,
+        samples_out="device" if last.destination.kind == "device" else "real",
         steps=tuple(steps),
         variables=variables,
         env=checked_environment(env or {}, variables),

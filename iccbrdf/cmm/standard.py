@@ -26,6 +26,7 @@ def standard_XYZ(profile: Profile, dtype: type[np.floating[Any]] = np.float32) -
     return Transform(
         channels_in=space.names,
         channels_out=("X", "Y", "Z"),
+        samples_out="real",
         steps=tuple(steps),
         variables=(),
         env={},

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,8 @@ class Transform:
     """Names of the input channels, in order."""
     channels_out: tuple[str, ...]
     """Names of the output channels, in order."""
+    samples_out: Literal["device", "real"]
+    """What the results are: device values, of a chain that ends on a device, or physical ones."""
     steps: tuple[Step, ...]
     variables: tuple[str, ...]
     """Names of the run-time variables that the profiles read."""
