@@ -5,8 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import secrets
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from iccbrdf.errors import LimitError, UsageError
@@ -75,3 +75,21 @@ def atomic_output(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_together(files: Mapping[Path, bytes], *, overwrite: bool = False) -> None:
+    """Write files that belong together: none appears before all of them are written in full.
+
+    Raises as `atomic_output`.
+    """
+    with ExitStack() as stack:
+        for path, data in files.items():
+            stack.enter_context(atomic_output(path, overwrite=overwrite)).write_bytes(data)
+
+
+def make_folder(path: StrPath) -> None:
+    """Make a folder for outputs, and those above it, unless it is there; UsageError where that cannot be."""
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be made: {error.strerror}") from error

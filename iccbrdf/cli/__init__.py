@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from iccbrdf.errors import IccBrdfError, ProfileWarning
+from iccbrdf.errors import IccBrdfError, InputError, ProfileWarning, UsageError, nearest
 
 COMMANDS = {
     "build": "Make a MID and an MVIS profile from a primaries file.",
@@ -19,7 +19,9 @@ COMMANDS = {
     "dump": "Show what a profile holds.",
     "demo": "Softproof a relief print of a real landscape.",
 }
-_INTERNAL_ERROR = 5
+_INTERNAL_ERROR = IccBrdfError.exit_code
+_INTERRUPTED = 130
+"""As shells report it: 128 and the number of the signal."""
 
 
 class Commands(click.Group):
@@ -43,52 +45,63 @@ class Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            from iccbrdf.errors import nearest
-
             ctx.fail(f"no command {args[0]!r}: {nearest(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]}
+)
 @click.version_option(package_name="iccbrdf")
-def cli() -> None:
+@click.pass_context
+def cli(ctx: click.Context) -> None:
     """Directional appearance in ICC.2 profiles.
 
     \b
     Exit codes: 0 done; 1 a check that was asked for failed; 2 usage;
-    3 input unreadable or malformed; 4 refused by a limit; 5 internal error.
+    3 input unreadable or malformed; 4 refused by a limit; 5 internal error;
+    130 interrupted.
     """
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help(), err=True)
+        ctx.exit(UsageError.exit_code)
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and leave with its exit code."""
-    warnings.showwarning = _show_warning
     as_json = "--json" in (sys.argv[1:] if arguments is None else arguments)
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        sys.exit(_run(arguments, as_json))
+
+
+def _run(arguments: list[str] | None, as_json: bool) -> int:
     try:
-        code = cli.main(args=arguments, prog_name="iccbrdf", standalone_mode=False)
-    except click.exceptions.Exit as e:
-        code = e.exit_code
+        return cli.main(args=arguments, prog_name="iccbrdf", standalone_mode=False) or 0
+    except SystemExit:
+        return 0  # so click ends when the reader of a pipe had enough
     except click.Abort:
-        _fail("interrupted", 1, as_json)
-    except click.ClickException as e:
-        usage = e.ctx.get_usage() + "\n" if isinstance(e, click.UsageError) and e.ctx else ""
-        click.echo(usage, err=True, nl=False)
-        _fail(e.format_message(), 2, as_json)
+        return _failed("interrupted", _INTERRUPTED, as_json)
+    except click.UsageError as e:
+        hint = f"\nTry '{e.ctx.command_path} --help'." if e.ctx else ""
+        return _failed(e.format_message() + hint, UsageError.exit_code, as_json)
     except IccBrdfError as e:
-        _fail(str(e), e.exit_code, as_json)
-    except BrokenPipeError:
-        code = 0  # the reader of stdout had enough
+        return _failed(str(e), e.exit_code, as_json)
+    except OSError as e:
+        # What no layer below could name better: a device that fails in mid-file, a folder that vanishes.
+        return _failed(f"{e.filename or 'input or output'}: {e.strerror}", InputError.exit_code, as_json)
     except Exception as e:
         traceback.print_exc()
-        _fail(f"internal error, please report it with the lines above: {e}", _INTERNAL_ERROR, as_json)
-    sys.exit(code if isinstance(code, int) else 0)
+        return _failed(
+            f"internal error, please report it with the lines above: {e}", _INTERNAL_ERROR, as_json
+        )
 
 
-def _fail(message: str, code: int, as_json: bool) -> None:
+def _failed(message: str, code: int, as_json: bool) -> int:
     click.echo(f"iccbrdf: {message}", err=True)
     if as_json:
         click.echo(json.dumps({"schema": "iccbrdf.error/1", "error": message, "exit_code": code}))
-    sys.exit(code)
+    return code
 
 
 def _show_warning(message: Any, category: type[Warning], *args: Any, **kwargs: Any) -> None:

@@ -7,10 +7,9 @@ from typing import Any, Literal
 
 import click
 
-from iccbrdf.cli.options import emit, environment, force_option, json_option, scene_options
+from iccbrdf.cli.options import emit, environment, force_option, json_option, name_list, scene_options
 from iccbrdf.cli.pipeline import Output, arranged_channels, check_outputs, run
 from iccbrdf.cmm import INTENTS, link
-from iccbrdf.errors import UsageError
 from iccbrdf.icc import read_profile
 from iccbrdf.images import Samples, open_tiff
 
@@ -42,7 +41,8 @@ Examples:
 @click.option("--dtype", type=click.Choice(("float32", "uint16")), default="float32", show_default=True,
               help="Samples of a TIFF; uint16 holds XYZ as the ICC's u1.15.")  # fmt: skip
 @click.option("--embed", is_flag=True, help="Embed the last profile in a TIFF.")
-@click.option("--exposure", type=float, default=1.0, show_default=True, help="Factor on the XYZ of a PNG.")
+@click.option("--exposure", type=click.FloatRange(min=0, min_open=True), default=1.0,
+              show_default=True, help="Factor on the XYZ of a PNG.")  # fmt: skip
 @click.option(
     "--depth", type=click.Choice(("8", "16")), default="8", show_default=True, help="Bits of a PNG."
 )
@@ -79,8 +79,6 @@ def command(
     embedded = last.to_bytes() if embed else None
     targets = [Output(path, dtype, embedded, exposure, 16 if depth == "16" else 8) for path in outputs]
     check_outputs(targets, overwrite=force)
-    if not exposure > 0:
-        raise UsageError(f"--exposure is {exposure}, expected a number above 0")
     variables = environment(light, view, env)
     with open_tiff(image, samples) as source:
         settings: dict[str, Any] = {
@@ -91,7 +89,7 @@ def command(
             "samples": source.samples,
         }
         transform = link(chain, **settings)
-        declared = channels.split(",") if channels else None
+        declared = name_list(channels) if channels is not None else None
         names = arranged_channels(source, transform.channels_in, declared)
         if names is not None:
             transform = link(chain, channels=names, **settings)
@@ -108,11 +106,13 @@ def command(
             "intent": intent,
             "env": dict(transform.env),
             "backend": transform.backend,
-            "not_finite": done.not_finite,
+            "not_finite_in": done.not_finite_in,
+            "not_finite_out": done.not_finite_out,
             "outputs": done.outputs,
         }
-    if done.not_finite:
-        click.echo(f"iccbrdf: warning: {done.not_finite} samples of the result are not finite", err=True)
+    for count, what in ((done.not_finite_in, "image"), (done.not_finite_out, "result")):
+        if count:
+            click.echo(f"iccbrdf: warning: {count} samples of the {what} are not finite numbers", err=True)
     text = [f"{image}: {size}, {len(transform.channels_in)} channels ({source.samples} samples)"]
     for output in done.outputs:
         counts = [f"{n} {name.replace('_', ' ')}" for name, n in output.items() if name != "path" and n]

@@ -7,11 +7,10 @@ from pathlib import Path
 import click
 
 from iccbrdf.brdf.primaries import read_primaries
-from iccbrdf.build import build_pair
-from iccbrdf.cli.options import emit, environment, force_option, json_option, scene_options
+from iccbrdf.build import Pair, build_pair
+from iccbrdf.cli.options import emit, environment, force_option, json_option, name_list, scene_options
 from iccbrdf.errors import UsageError
-from iccbrdf.files import atomic_output, check_target
-from iccbrdf.icc import write_profile
+from iccbrdf.files import make_folder, write_together
 
 EPILOG = """
 \b
@@ -52,26 +51,21 @@ def command(
     """
     if effects is not None and without is not None:
         raise UsageError("--effects and --without are two ways to say one thing: give one of them")
+    source = read_primaries(primaries)
     pair = build_pair(
-        read_primaries(primaries),
-        effects=effects.split(",") if effects is not None else None,
-        without=without.split(",") if without is not None else (),
+        source,
+        effects=name_list(effects) if effects is not None else None,
+        without=name_list(without or ""),
         fresnel_angle=fresnel_angle,
         variables=environment(light, view, env),
     )
-    files = [folder / name for name in ("mid.icc", "mvis.icc", "mvis.txt")]
-    folder.mkdir(parents=True, exist_ok=True)
-    for file in files:
-        check_target(file, overwrite=force)
-    write_profile(pair.mid, files[0], overwrite=force)
-    write_profile(pair.mvis, files[1], overwrite=force)
-    with atomic_output(files[2], overwrite=force) as temporary:
-        temporary.write_text(pair.listing, encoding="utf-8")
+    files = write_pair(pair, folder, overwrite=force)
     compiled = pair.compiled
+    simulated = [name for name, on in compiled.effects.items() if on]
     result = {
         "primaries": str(primaries),
-        "model": compiled.model,
-        "effects": sorted(compiled.effects),
+        "model": source.model,
+        "effects": simulated,
         "channels": list(compiled.inputs),
         "variables": dict(compiled.variables),
         "operators": len(compiled.program),
@@ -79,8 +73,20 @@ def command(
         "files": [str(file) for file in files],
     }
     text = [
-        f"{compiled.model}: {len(compiled.program)} operators, at most {compiled.executed} run for a pixel",
-        f"  effects: {', '.join(sorted(compiled.effects)) or 'none'}",
+        f"{source.model}: {len(compiled.program)} operators, at most {compiled.executed} run for a pixel",
+        f"  effects: {', '.join(simulated) or 'none'}",
         *(f"  -> {file}" for file in files),
     ]
     emit(as_json, "iccbrdf.build/1", result, "\n".join(text))
+
+
+def write_pair(pair: Pair, folder: Path, *, overwrite: bool) -> list[Path]:
+    """Write mid.icc, mvis.icc and their listing, all of them or none; returns their paths."""
+    make_folder(folder)
+    files = {
+        folder / "mid.icc": pair.mid.to_bytes(),
+        folder / "mvis.icc": pair.mvis.to_bytes(),
+        folder / "mvis.txt": pair.listing.encode(),
+    }
+    write_together(files, overwrite=overwrite)
+    return list(files)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import click
+import numpy as np
 
 from iccbrdf.brdf.geometry import direction
 from iccbrdf.errors import UsageError
@@ -57,16 +58,27 @@ def environment(light: str | None, view: str | None, env: tuple[str, ...]) -> di
 
 
 def parse_direction(option: str, text: str) -> tuple[float, float, float]:
-    """`ZENITH,AZIMUTH` in degrees or a vector `X,Y,Z`, not necessarily of unit length."""
+    """A unit vector from `ZENITH,AZIMUTH` in degrees or from a vector `X,Y,Z` of any length."""
     numbers = [_number(option, part) for part in text.split(",")]
     if len(numbers) == 2:
-        x, y, z = (float(c) for c in direction(*numbers))
-        return x, y, z
-    if len(numbers) != 3:
+        if abs(numbers[0]) > 90:
+            raise UsageError(f"{option} {text!r}: the zenith angle is {numbers[0]:g}, expected -90 to 90")
+        vector = direction(*numbers)
+    elif len(numbers) == 3:
+        # Scaled first, so that no square overflows or vanishes.
+        vector = np.array(numbers) / (max(map(abs, numbers)) or 1)
+    else:
         raise UsageError(f"{option} {text!r}: expected ZENITH,AZIMUTH in degrees or a vector X,Y,Z")
-    if not any(numbers):
+    length = np.linalg.norm(vector)
+    if length == 0:
         raise UsageError(f"{option} {text!r}: a vector of length 0 has no direction")
-    return numbers[0], numbers[1], numbers[2]
+    x, y, z = (vector / length).tolist()
+    return x, y, z
+
+
+def name_list(text: str) -> list[str]:
+    """Names separated by commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
 
 
 def _number(option: str, text: str) -> float:

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from iccbrdf.cmm import Transform, standard_XYZ
-from iccbrdf.errors import LinkError, UsageError, nearest
+from iccbrdf.errors import UsageError, nearest
 from iccbrdf.files import check_target
 from iccbrdf.icc import Profile
 from iccbrdf.images import Block, TiffSource, create_tiff
@@ -20,6 +21,8 @@ from iccbrdf.images.display import create_png
 
 TIFF_SUFFIXES = (".tif", ".tiff")
 PNG_SUFFIX = ".png"
+
+_COLORIMETRIC = (("X", "Y", "Z"), ("L*", "a*", "b*"))
 
 
 @dataclass(frozen=True)
@@ -46,21 +49,25 @@ class Done:
     """What a run wrote and met."""
 
     outputs: list[dict[str, Any]] = field(default_factory=list)
-    not_finite: int = 0
-    """Samples of the result that are not finite numbers."""
+    not_finite_in: int = 0
+    """Samples of the image that are not finite numbers."""
+    not_finite_out: int = 0
+    """The same of the result."""
 
 
 def check_outputs(outputs: Sequence[Output], *, overwrite: bool) -> None:
     """Refuse, before any work, an output that could not be written."""
-    for i, output in enumerate(outputs):
+    seen = set()
+    for output in outputs:
         suffix = output.path.suffix.lower()
         if suffix not in (*TIFF_SUFFIXES, PNG_SUFFIX):
             raise UsageError(
                 f"{output.path}: found suffix {suffix!r}, expected {', '.join((*TIFF_SUFFIXES, PNG_SUFFIX))}"
             )
-        if output.path in [o.path for o in outputs[:i]]:
+        target = check_target(output.path, overwrite=overwrite)
+        if target in seen:
             raise UsageError(f"{output.path}: is to be written twice")
-        check_target(output.path, overwrite=overwrite)
+        seen.add(target)
 
 
 def run(
@@ -75,20 +82,21 @@ def run(
     """Stream `source` through `transform`, whose chain ends on profile `last`, into `outputs`."""
     to_display = None
     if any(output.is_png for output in outputs):
-        if last.header.pcs not in ("XYZ ", "Lab "):
-            raise LinkError(
-                f"{last.source}: a PNG needs a chain that ends on XYZ or Lab, such as a MID and an MVIS"
+        if transform.channels_out not in _COLORIMETRIC:
+            raise UsageError(
+                f"a PNG needs profiles that end on XYZ or Lab, such as a MID and an MVIS; "
+                f"{last.source} gives {', '.join(transform.channels_out)}"
             )
         to_display = standard_XYZ(last)
     done = Done()
     with ExitStack() as stack:
         sinks = [
-            stack.enter_context(_open(output, source, transform.channels_out, overwrite))
-            for output in outputs
+            stack.enter_context(_open(output, source, transform, overwrite)) for output in outputs
         ]
         for block in _progress(source, label):
             result = transform(block.data)
-            done.not_finite += int(result.size - np.count_nonzero(np.isfinite(result)))
+            done.not_finite_in += _not_finite(block.data)
+            done.not_finite_out += _not_finite(result)
             display = to_display(result) if to_display else result
             for output, sink in zip(outputs, sinks, strict=True):
                 sink.write(block._replace(data=display if output.is_png else result))
@@ -98,7 +106,11 @@ def run(
     return done
 
 
-def _open(output: Output, source: TiffSource, names: tuple[str, ...], overwrite: bool) -> Any:
+def _not_finite(data: npt.NDArray[Any]) -> int:
+    return data.size - int(np.count_nonzero(np.isfinite(data)))
+
+
+def _open(output: Output, source: TiffSource, transform: Transform, overwrite: bool) -> Any:
     if output.is_png:
         return create_png(
             output.path,
@@ -112,8 +124,8 @@ def _open(output: Output, source: TiffSource, names: tuple[str, ...], overwrite:
         output.path,
         source.height,
         source.width,
-        names,
-        samples="real",
+        transform.channels_out,
+        samples=transform.samples_out,
         dtype=output.dtype,
         profile=output.profile,
         overwrite=overwrite,
@@ -138,22 +150,22 @@ def _progress(source: TiffSource, label: str) -> Iterable[Block]:
 
 def arranged_channels(
     source: TiffSource, own: Sequence[str], declared: Sequence[str] | None
-) -> list[str] | None:
+) -> Sequence[str] | None:
     """The names to link by: those declared, else those in the file; None where there are neither.
 
-    Raises UsageError where the number of channels does not fit, or a name is unknown.
+    `own` are the first profile's.  Raises UsageError where the number of names or channels does not fit, or
+    where a name that was declared is unknown.
     """
-    names = declared or source.names
-    if names is None:
-        if source.channels != len(own):
-            raise UsageError(
-                f"the image has {source.channels} channels without names, the first profile {len(own)} "
-                f"({', '.join(own)}); name the image's channels with --channels"
-            )
-        return None
-    if len(names) != source.channels:
-        raise UsageError(f"--channels names {len(names)} channels, the image has {source.channels}")
-    for name in names:
+    if declared is None and source.names is None and source.channels != len(own):
+        raise UsageError(
+            f"the image has {source.channels} channels without names, the first profile {len(own)} "
+            f"({', '.join(own)}); name the image's channels with --channels"
+        )
+    if declared is None:
+        return source.names
+    if len(declared) != source.channels:
+        raise UsageError(f"--channels names {len(declared)} channels, the image has {source.channels}")
+    for name in declared:
         if name not in own:
-            raise LinkError(f"the image's channel {name!r} is not in the first profile: {nearest(name, own)}")
-    return list(names)
+            raise UsageError(f"--channels: {name!r} is not in the first profile: {nearest(name, own)}")
+    return declared
