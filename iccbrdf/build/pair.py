@@ -86,7 +86,7 @@ def build_pair(
         filename=path.name,
         constants=constants,
         effects={**_switches(path, effects), **model.effects, **dict.fromkeys(without, False)},
-        **({"variables": variables} if variables else {}),
+        variables=variables,
     )
     conditions = viewing(primaries.illuminant, primaries.observer, primaries.white)
     ranges = _ranges(compiled.inputs, primaries.encoding)

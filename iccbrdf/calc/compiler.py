@@ -51,6 +51,7 @@ def compile_template(
     filename: str,
     constants: Mapping[str, float | Sequence[float] | str] | None = None,
     effects: Mapping[str, bool] | None = None,
+    variables: Mapping[str, float] | None = None,
 ) -> Compiled:
     """
     Compile a template.
@@ -66,16 +67,19 @@ def compile_template(
         template's defaults.  Folded in float64, rounded to float32 once, where they are written.
     effects
         Switches that differ from the template's defaults.
+    variables
+        Values of run-time variables where the environment does not define them, instead of the
+        template's defaults.
 
     Raises
     ------
     InputError
-        An error in the template at file:line:column, or a constant, choice or effect that it does not
-        declare, with the nearest that it does.
+        An error in the template at file:line:column, or a constant, choice, effect or run-time variable
+        that it does not declare, with the nearest that it does.
     """
     try:
         template = parse(text, filename)
-        lowered = lower(template, constants or {}, effects or {})
+        lowered = lower(template, constants or {}, effects or {}, variables or {})
     except RecursionError:
         raise InputError(f"{filename}: expressions are nested too deeply; use `let` for parts") from None
     graph, report = optimise(lowered.graph)

@@ -264,9 +264,11 @@ class _Lowering:
         default = self._known(declared.default, f"the default of {name}")
         if len(default) != 1:
             raise declared.place.error(f"the default of {name} has {len(default)} components, expected 1")
-        value = float(self._variables.get(name, default[0]))
-        self._result.variables[name] = value
-        return self._graph.env(name, value)
+        given = _numbers(self._variables.get(name, default[0]))
+        if given is None or len(given) != 1:
+            raise declared.place.error(f"{name} is {self._variables[name]!r}; expected 1 finite number")
+        self._result.variables[name] = given[0]
+        return self._graph.env(name, given[0])
 
     def _constant(self, declared: Constant) -> Node:
         name = declared.name

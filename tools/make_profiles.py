@@ -1,0 +1,39 @@
+"""Make the example profiles of profiles/ anew from their primaries files.
+
+python tools/make_profiles.py [-o profiles]
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from iccbrdf.brdf.primaries import read_primaries
+from iccbrdf.build import build_pair
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def files(primaries: Path) -> dict[str, bytes]:
+    """What stands beside a primaries file: its profiles and their listing, by name."""
+    pair = build_pair(read_primaries(primaries))
+    return {
+        "mid.icc": pair.mid.to_bytes(),
+        "mvis.icc": pair.mvis.to_bytes(),
+        "mvis.txt": pair.listing.encode(),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("-o", "--output", type=Path, default=ROOT / "profiles")
+    arguments = parser.parse_args()
+    for primaries in sorted(ROOT.glob("profiles/*/primaries.json")):
+        folder = arguments.output / primaries.parent.name
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, data in files(primaries).items():
+            (folder / name).write_bytes(data)
+
+
+if __name__ == "__main__":
+    main()
