@@ -126,6 +126,9 @@ def test_run_time_variables_have_defaults_one_by_one():
     assert value(expression, declarations=declarations, width=4, env=env) == [0, 7, 2.5, -1]
     result = compiled(f"{declarations}\noutput X = litI + light.x\n")
     assert result.variables == {"litX": -1, "litY": 0, "litZ": 2.5, "litI": np.pi}
+    result = compiled(f"{declarations}\noutput X = litI + light.x\n", variables={"litI": 2, "litX": 0.5})
+    assert result.variables == {"litX": 0.5, "litY": 0, "litZ": 2.5, "litI": 2}
+    assert float(run(result.program, [], 1)[0]) == 2.5
 
 
 def test_constants_choices_and_effects_are_set_from_outside():
@@ -206,10 +209,13 @@ def test_errors_say_where_what_and_what_was_expected(body, expected):
         ({"constants": {"refraction": "2"}}, "refraction is '2'; expected 1 finite number(s)"),
         ({"constants": {"angle": "alhpa"}}, "t.calc:4:1: angle is 'alhpa'; did you mean 'alpha'?"),
         ({"effects": {"specula": True}}, "no effect 'specula' is declared; did you mean 'specular'?"),
+        ({"variables": {"litx": 1}}, "no run-time variable 'litx' is declared; did you mean 'litX'?"),
+        ({"variables": {"litX": float("inf")}}, "t.calc:5:1: litX is inf; expected 1 finite number"),
     ],
 )
 def test_unknown_settings_name_the_nearest(settings, expected):
-    body = "effect specular = on\nconstant refraction = 1.5\nchoice angle = theta_i | alpha\noutput X = 1"
+    body = "effect specular = on\nconstant refraction = 1.5\nchoice angle = theta_i | alpha\n"
+    body += "runtime litX = 1\noutput X = 1"
     assert expected in message(body, **settings)
 
 
@@ -225,5 +231,5 @@ def test_a_template_needs_a_name():
 
 def test_deep_nesting_is_refused_and_long_chains_are_not():
     assert "nested too deeply" in message("output X = " + "-" * 5000 + "1")
-    chain = "input a\n" + "".join(f"let x{k} = sin({f'x{k - 1}' if k else 'a'}) + 1\n" for k in range(2000))
-    assert compiled(chain + "output X = x1999").executed == 6002
+    chain = "input a\n" + "".join(f"let x{k} = sin({f'x{k - 1}' if k else 'a'}) + 1\n" for k in range(1200))
+    assert compiled(chain + "output X = x1199").executed == 3602

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeAlias
 
-from lark import Lark, Token, Transformer, UnexpectedCharacters, UnexpectedInput, UnexpectedToken, v_args
+from lark import Lark, Token, Transformer, UnexpectedCharacters, UnexpectedToken, v_args
 from lark.exceptions import VisitError
 
 from iccbrdf.errors import InputError, nearest
@@ -223,7 +223,10 @@ def parse(text: str, filename: str) -> Template:
     try:
         tree = _parser().parse(text + "\n")
         statements = _Builder(filename).transform(tree)
-    except UnexpectedInput as error:
+    except UnexpectedCharacters as error:
+        place = Place(filename, error.line, error.column)
+        raise place.error(f"found {error.char!r}, which no part of the language begins with") from None
+    except UnexpectedToken as error:
         raise _syntax_error(error, filename) from None
     except VisitError as error:
         raise error.orig_exc from None
@@ -274,12 +277,7 @@ _DESCRIPTIONS = {
 }
 
 
-def _syntax_error(error: UnexpectedInput, filename: str) -> InputError:
-    place = Place(filename, error.line, error.column)
-    if isinstance(error, UnexpectedCharacters):
-        return place.error(f"found {error.char!r}, which no part of the language begins with")
-    if not isinstance(error, UnexpectedToken):
-        return place.error("the template ends in the middle of a statement")
+def _syntax_error(error: UnexpectedToken, filename: str) -> InputError:
     token = error.token
     found = "the end of the line" if token.type == "_NL" else f"{str(token)!r}"
     if token.type == "$END":
@@ -289,7 +287,7 @@ def _syntax_error(error: UnexpectedInput, filename: str) -> InputError:
     keywords = [text.strip("'") for name, text in expected.items() if text.strip("'").isalpha()]
     if token.type == "NAME" and "NAME" not in expected and keywords:
         message += f"; {nearest(str(token), keywords)}"
-    return place.error(message)
+    return Place(filename, error.line, error.column).error(message)
 
 
 def _describe(terminal: str) -> str:
