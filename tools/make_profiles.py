@@ -16,12 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 def files(primaries: Path) -> dict[str, bytes]:
     """What stands beside a primaries file: its profiles and their listing, by name."""
-    pair = build_pair(read_primaries(primaries))
-    return {
-        "mid.icc": pair.mid.to_bytes(),
-        "mvis.icc": pair.mvis.to_bytes(),
-        "mvis.txt": pair.listing.encode(),
-    }
+    return build_pair(read_primaries(primaries)).files
 
 
 def main() -> None:

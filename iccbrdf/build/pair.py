@@ -6,7 +6,7 @@ model as a calculator program.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,10 @@ import numpy as np
 
 from iccbrdf.brdf.primaries import Primaries
 from iccbrdf.build.listing import listing
-from iccbrdf.build.models import MODELS
+from iccbrdf.build.models import MODELS, Model
 from iccbrdf.build.viewing import Viewing, viewing
 from iccbrdf.calc import Compiled, compile_template
+from iccbrdf.errors import UsageError, nearest
 from iccbrdf.icc import (
     XYZ,
     Calculator,
@@ -45,6 +46,15 @@ class Pair:
     listing: str
     compiled: Compiled
 
+    @property
+    def files(self) -> dict[str, bytes]:
+        """What is written to a folder, by file name."""
+        return {
+            "mid.icc": self.mid.to_bytes(),
+            "mvis.icc": self.mvis.to_bytes(),
+            "mvis.txt": self.listing.encode(),
+        }
+
 
 def build_pair(
     primaries: Primaries,
@@ -71,9 +81,10 @@ def build_pair(
 
     Raises
     ------
-    InputError
-        An effect or a variable is unknown.
+    UsageError
+        An effect or a variable is unknown, or `fresnel_angle` is given and there is no Fresnel term.
     """
+    variables = variables or {}
     model = MODELS[primaries.model]
     path = folder("calc_templates") / model.template
     constants: dict[str, Any] = {"white": primaries.white}
@@ -81,11 +92,22 @@ def build_pair(
         constants["refractive_index"] = primaries.refractive_index
     if fresnel_angle is not None:
         constants["fresnel_angle"] = fresnel_angle
+    template = path.read_text(encoding="utf-8")
+    declared = compile_template(template, filename=path.name)
+    choosable = [name for name in declared.effects if name not in model.effects]
+    _check_names("effect", (*(effects or ()), *without), choosable, model)
+    _check_names("run-time variable", variables, declared.variables, model)
+    chosen = {
+        name: name not in without and (declared.effects[name] if effects is None else name in effects)
+        for name in choosable
+    }
+    if fresnel_angle is not None and not chosen.get("fresnel"):
+        raise UsageError(f"a Fresnel angle is given, but {model.title} has no Fresnel term or it is left out")
     compiled = compile_template(
-        path.read_text(encoding="utf-8"),
+        template,
         filename=path.name,
         constants=constants,
-        effects={**_switches(path, effects), **model.effects, **dict.fromkeys(without, False)},
+        effects={**chosen, **model.effects},
         variables=variables,
     )
     conditions = viewing(primaries.illuminant, primaries.observer, primaries.white)
@@ -95,12 +117,10 @@ def build_pair(
     return Pair(mid, mvis, listing(model.title, compiled, ranges, conditions), compiled)
 
 
-def _switches(path: Path, effects: Collection[str] | None) -> dict[str, bool]:
-    """All the effects of a template, on where `effects` names them; nothing where that is None."""
-    if effects is None:
-        return {}
-    known = compile_template(path.read_text(encoding="utf-8"), filename=path.name).effects
-    return {**dict.fromkeys(known, False), **dict.fromkeys(effects, True)}
+def _check_names(what: str, names: Iterable[str], valid: Collection[str], model: Model) -> None:
+    for name in names:
+        if name not in valid:
+            raise UsageError(f"{model.title} has no {what} {name!r}: {nearest(name, valid)}")
 
 
 def _ranges(channels: Sequence[str], encoding: Mapping[str, float]) -> list[tuple[float, float]]:

@@ -83,10 +83,6 @@ def command(
 def write_pair(pair: Pair, folder: Path, *, overwrite: bool) -> list[Path]:
     """Write mid.icc, mvis.icc and their listing, all of them or none; returns their paths."""
     make_folder(folder)
-    files = {
-        folder / "mid.icc": pair.mid.to_bytes(),
-        folder / "mvis.icc": pair.mvis.to_bytes(),
-        folder / "mvis.txt": pair.listing.encode(),
-    }
+    files = {folder / name: data for name, data in pair.files.items()}
     write_together(files, overwrite=overwrite)
     return list(files)
