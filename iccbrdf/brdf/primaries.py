@@ -27,12 +27,19 @@ from iccbrdf.brdf.cook_torrance import M_MIN
 from iccbrdf.brdf.geometry import Array
 from iccbrdf.brdf.models import MODELS, Model
 from iccbrdf.brdf.records import Record, read_record, to_json
+from iccbrdf.errors import InputError
 from iccbrdf.files import StrPath, atomic_output
 
 SCHEMA = "iccbrdf-primaries"
 VERSION = 1
 
 REFRACTIVE_INDEX = 1.5
+
+MIN_NODES, MAX_NODES = 4, 16
+"""How many primaries span an interpolation; the papers use 8."""
+
+_COINCIDE = 1e-5
+"""Nodes no further apart in each of X, Y, Z are one colour: a tenth of the last digit that is measured."""
 
 OBSERVERS = ("CIE 1931 2 Degree Standard Observer", "CIE 1964 10 Degree Standard Observer")
 """The observers that a profile can state, by the names of colour-science."""
@@ -123,6 +130,31 @@ def read_primaries(path: StrPath) -> Primaries:
             record.number("refractive_index", 1) if "refractive_index" in record.values else REFRACTIVE_INDEX
         ),
     )
+
+
+def check_nodes(primaries: Primaries) -> None:
+    """
+    Refuse primaries that a map from XYZ to parameters cannot be interpolated between.
+
+    Raises
+    ------
+    InputError
+        Fewer than 4 or more than 16 primaries, an XYZ that is not above 0, or two of one colour.
+    """
+    count = len(primaries.primaries)
+    if not MIN_NODES <= count <= MAX_NODES:
+        raise InputError(f"{count} primaries, expected {MIN_NODES} to {MAX_NODES} to interpolate between")
+    XYZ = primaries.XYZ
+    for k, primary in enumerate(primaries.primaries):
+        where = f"primary {k + 1} ({primary.name})"
+        if not np.all(XYZ[k] > 0):
+            raise InputError(f"{where}: XYZ is {list(primary.XYZ)}, expected numbers above 0")
+        same = np.flatnonzero(np.max(np.abs(XYZ[:k] - XYZ[k]), axis=-1) <= _COINCIDE)
+        if same.size:
+            raise InputError(
+                f"{where}: XYZ is {list(primary.XYZ)}, that of primary {same[0] + 1} "
+                f"({primaries.primaries[same[0]].name}), expected colours more than {_COINCIDE:g} apart"
+            )
 
 
 def write_primaries(primaries: Primaries, path: StrPath, *, overwrite: bool = False) -> None:
