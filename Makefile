@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: demo test lint types clean
+.PHONY: demo test lint types profiles figures clean
 
 # The environment is remade when the dependencies change.
 $(VENV)/installed: pyproject.toml
@@ -22,6 +22,13 @@ lint: $(VENV)/installed
 
 types: $(VENV)/installed
 	$(BIN)/mypy
+
+# What is made of other files in the repository and lies in it all the same.
+profiles: $(VENV)/installed
+	$(BIN)/python tools/make_profiles.py
+
+figures: demo
+	$(BIN)/python tools/make_figures.py
 
 clean:
 	rm -rf $(VENV) demo build *.egg-info .mypy_cache .ruff_cache .pytest_cache
