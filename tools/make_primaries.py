@@ -1,4 +1,4 @@
-"""Make the example primaries files of profiles/ from published tables, so that no figure is typed by hand.
+"""Make the example primaries and slopes files of profiles/ from published tables: no figure is typed by hand.
 
     python tools/make_primaries.py [--data ../shared/data] [-o profiles]
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from iccbrdf.brdf.geometry import planar
 from iccbrdf.brdf.models import evaluate
 from iccbrdf.brdf.primaries import Primaries, Primary, write_primaries
+from iccbrdf.brdf.slopes import Slope, Slopes, write_slopes
 
 ROOT = Path(__file__).resolve().parent.parent
 TWO_DEGREES = "CIE 1931 2 Degree Standard Observer"
@@ -36,6 +37,11 @@ PATCHES = {
     "CMY": (100, 100, 100, 0),
     "K": (0, 0, 0, 100),
 }
+
+ANGLES = (0, 15, 30, 45, 60)
+
+# Of the darkest neutral patches, one within the usual 330 % limit of ink.
+RICH_BLACK = (80, 65, 65, 100)
 
 # ks and m of Cook-Torrance BRDF1 with n = 1.5, fitted to the gonioreflectometer data of the Cornell Program
 # of Computer Graphics.  ks is that of a white of Y = 1: its colour is the illuminant's.
@@ -65,6 +71,13 @@ LANDSCAPE_SOURCE = (
     "elevation tints from low to high ground. Gloss: ks and m fitted to two paints measured by the Cornell "
     "Program of Computer Graphics, from krylon true blue in the valley to garnet red on the summit. This "
     "pairing is the project's own. kd: the XYZ less the gloss at 45:0."
+)
+SLOPES_SOURCE = (
+    "Computed, not measured: no colours of printed slopes are public. Flat: FOGRA39L characterisation data, "
+    "coated offset, D50, 2 degrees, 45:0 (Fogra, 2006), paper and C80 M65 Y65 K100. Slopes: the same ink on "
+    "1/cos of the area makes films cos times as thick; the white is a layer that scatters and does not "
+    "absorb over black, R = t/(1 + t) with t its scattering power (Kubelka-Munk), the black a film on it "
+    "whose density goes with its thickness."
 )
 PAINTING_SOURCE = (
     "F. Marton, Cape Spartivento Lighthouse, oil on canvas, measured by cnr-isti-vclab (OpenLIME): mean of "
@@ -143,6 +156,21 @@ def make_ward_painting(data: Path) -> Primaries:
     )
 
 
+def make_fogra39_slopes(data: Path) -> Slopes:
+    """Return white and black of FOGRA39, and what thinner films of both would be on slopes."""
+    colours = read_colours(data / "print" / "FOGRA39L.ti3")
+    Wf, Bf = np.array(colours[PATCHES["White"]]), np.array(colours[RICH_BLACK])
+    scattering_power = Wf / (PCS_WHITE - Wf)
+    slopes = []
+    for angle in ANGLES:
+        thickness = planar(angle)[2]
+        t = scattering_power * thickness
+        Ws = PCS_WHITE * t / (1 + t)
+        Bs = Ws * (Bf / Wf) ** thickness
+        slopes.append(Slope(angle, *(tuple(XYZ.round(DIGITS).tolist()) for XYZ in (Ws, Bs))))
+    return Slopes("D50", TWO_DEGREES, PCS_WHITE, "0:45", SLOPES_SOURCE, tuple(slopes))
+
+
 def factor_45_0(model: str, parameters: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return XYZ at 45:0 relative to the perfect diffuser in the same light."""
     flat, light, view = planar(0), planar(-45), planar(0)
@@ -194,6 +222,8 @@ def main() -> None:
         folder = arguments.output / name
         folder.mkdir(parents=True, exist_ok=True)
         write_primaries(make(arguments.data), folder / "primaries.json", overwrite=True)
+    slopes = make_fogra39_slopes(arguments.data)
+    write_slopes(slopes, arguments.output / "fogra39_gloss" / "slopes.json", overwrite=True)
 
 
 if __name__ == "__main__":
