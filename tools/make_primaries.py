@@ -167,7 +167,7 @@ def make_fogra39_slopes(data: Path) -> Slopes:
         t = scattering_power * thickness
         Ws = PCS_WHITE * t / (1 + t)
         Bs = Ws * (Bf / Wf) ** thickness
-        slopes.append(Slope(angle, *(tuple(XYZ.round(DIGITS).tolist()) for XYZ in (Ws, Bs))))
+        slopes.append(Slope(float(angle), *(tuple(XYZ.round(DIGITS).tolist()) for XYZ in (Ws, Bs))))
     return Slopes("D50", TWO_DEGREES, PCS_WHITE, "0:45", SLOPES_SOURCE, tuple(slopes))
 
 
