@@ -235,7 +235,7 @@ def test_an_image_without_normals_is_a_flat_print(pair):
 
 
 def test_an_image_of_normals_alone_is_white_and_matte(pair):
-    model, profiles = pair
+    _, profiles = pair
     bare = iccbrdf.link([profiles.mid, profiles.mvis], channels=("n.x", "n.y", "n.z"), env={"litX": 0.0})
     white = bare(np.array([0.5, 0.5, 1.0]))
     assert white == pytest.approx([0.9642, 1, 0.8249], rel=1e-6)
