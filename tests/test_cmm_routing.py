@@ -348,6 +348,11 @@ def test_real_samples_of_a_decoding_that_reorders():
     assert real([1, 2]).tolist() == [1, 2]
 
 
+def test_what_the_results_are():
+    ends = [mid("abc"), mvis("abc"), device_profile(B2A1=scaled(1))]
+    assert [iccbrdf.link(ends[: n + 1]).samples_out for n in range(3)] == ["real", "real", "device"]
+
+
 def test_real_samples_where_nothing_is_decoded():
     assert iccbrdf.link([mvis("abc")], samples="real")([1, 2, 3]).tolist() == [1, 2, 3]
     with pytest.raises(LinkError, match=r"real samples need .* decodes .* found 'calc'"):

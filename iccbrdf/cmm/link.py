@@ -92,7 +92,7 @@ def link(
 
     absolute = intent == "absolute"
     first, *others = stages(chain, intent)
-    if samples == "real" and first.source.kind == "device":
+    if samples == "real":
         first = without_decoding(first)
     steps: list[Step] = []
     if channels is not None:
