@@ -25,10 +25,10 @@ def frozen(values: Any, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
     given = np.asarray(values)
     with np.errstate(over="ignore", invalid="ignore"):
         array = np.array(given, dtype=dtype, order="C")
-    if array.dtype.kind == "f":
-        lost = np.isinf(array) & ~np.isinf(given.astype(np.float64))
-    else:
-        lost = array != given
+        if array.dtype.kind == "f":
+            lost = np.isinf(array) & ~np.isinf(given.astype(np.float64))
+        else:
+            lost = array != given
     if lost.any():
         raise ValueError(f"found {given[lost].flat[0]}, which {array.dtype.name} cannot hold")
     array.setflags(write=False)
