@@ -3,7 +3,7 @@
 Two methods: `published`, the papers' algorithm to the letter, which jumps where its choice of nodes changes
 (`published_interpolation`); and `smooth`, which is continuous (`smooth_interpolation`).  Both hold at the
 nodes and take 4 to 16 of them.  Which colours those are is the primaries file's matter: the papers use white,
-C, M, Y, CM, CY, MY and as the eighth CMY (2020) or K (2023); nine, with both, serve better.
+C, M, Y, CM, CY, MY and as the eighth CMY (2020) or K (2023); recommended are nine, with both.
 """
 
 from __future__ import annotations

@@ -151,8 +151,6 @@ def slope_adjust(
         T' = (T - C Bf) Ws / Wf + C Bs between.  This neither gives the measured black back nor is continuous
         (`published_jumps`).
 
-    On measured prints the two are about as accurate as each other.
-
     Parameters
     ----------
     XYZ
