@@ -138,10 +138,11 @@ def _progress(source: TiffSource, label: str) -> Iterable[Block]:
         yield from source.blocks()
         return
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=source.height * source.width)
+        task = bar.add_task(escape(label), total=source.height * source.width)
         for block in source.blocks():
             yield block
             height, width, _ = block.data.shape
