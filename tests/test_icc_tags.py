@@ -6,6 +6,8 @@ from iccbrdf.errors import ProfileError, UsageError
 from iccbrdf.icc import (
     TAGS,
     XYZ,
+    Colorant,
+    ColorantTable,
     LocalisedText,
     Mluc,
     NumberArray,
@@ -38,6 +40,16 @@ EXAMPLES = {
         """,
     ),
     "utf8": (Utf8("kd.X µ"), "75746638 00000000  6b642e5820 c2b5"),
+    "clrt": (
+        ColorantTable((Colorant("X"), Colorant("n.x", (1, 0x8000, 0xFFFF)))),
+        """
+        636c7274 00000000 00000002                                              # 'clrt', reserved, 2 colorants
+        58000000 00000000 00000000 00000000 00000000 00000000 00000000 00000000 # 'X'
+        0000 0000 0000                                                          # its colour is not said
+        6e2e7800 00000000 00000000 00000000 00000000 00000000 00000000 00000000 # 'n.x'
+        0001 8000 ffff
+        """,
+    ),
     "text": (PlainText("© you"), "74657874 00000000  a920796f75 00  # Latin-1, ended by a NUL"),
     "sig": (SignatureTag("CT10"), "73696720 00000000  43543130"),
     "XYZ": (
@@ -249,3 +261,9 @@ def test_what_the_file_cannot_hold_is_refused(make, message):
 def test_malformed(text, message):
     with pytest.raises(ProfileError, match=message):
         read(unhex(text))
+
+
+@pytest.mark.parametrize("name", ["", "a" * 32, "a\0b"])
+def test_colorant_names_that_cannot_be_stored(name):
+    with pytest.raises(UsageError, match="name"):
+        ColorantTable.of([name])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from iccbrdf.errors import ProfileError, UnsupportedError
-from iccbrdf.icc import MultiProcess, Profile, TagArray, channel_count
+from iccbrdf.icc import ColorantTable, MultiProcess, Profile, TagArray, channel_count
 
 _NAMES = {
     "XYZ ": ("X", "Y", "Z"),
@@ -78,8 +78,9 @@ def mcs_space(profile: Profile) -> Space:
 def device_space(profile: Profile, field: str = "colour_space") -> Space:
     """The device space of the header's `field`.
 
-    Its channels are named by the colour space; of an unnamed one (ncNNNN, NCLR), each channel that alone
-    feeds one multiplex channel bears that channel's name, and others are numbered from 1.
+    Its channels are named by the colour space; those of an unnamed one (ncNNNN, NCLR) by the tag clrt; where
+    there is none, a channel that alone feeds one multiplex channel bears that channel's name, and others
+    are numbered from 1.
     """
     signature: str = getattr(profile.header, field)
     if signature in _NAMES:
@@ -87,7 +88,16 @@ def device_space(profile: Profile, field: str = "colour_space") -> Space:
     count = channel_count(signature)
     if not count:
         raise UnsupportedError(f"{profile.source}: header: device space {signature!r} is not known")
-    return Space("device", signature, _decoded_names(profile, count) or tuple(map(str, range(1, count + 1))))
+    names = _colorant_names(profile, count) or _decoded_names(profile, count)
+    return Space("device", signature, names or tuple(map(str, range(1, count + 1))))
+
+
+def _colorant_names(profile: Profile, count: int) -> tuple[str, ...] | None:
+    """Names in the colorant table; None where it is missing or does not name each channel once."""
+    table = profile.get("clrt")
+    if not isinstance(table, ColorantTable) or not len(set(table.names)) == len(table.names) == count:
+        return None
+    return table.names
 
 
 def _decoded_names(profile: Profile, count: int) -> tuple[str, ...] | None:

@@ -31,6 +31,8 @@ from iccbrdf.icc.profile import (
 from iccbrdf.icc.tags import (
     TAGS,
     XYZ,
+    Colorant,
+    ColorantTable,
     LocalisedText,
     Mluc,
     NumberArray,
@@ -53,6 +55,8 @@ __all__ = [
     "XYZ",
     "Calculator",
     "Clut",
+    "Colorant",
+    "ColorantTable",
     "CurveSet",
     "ExtendedClut",
     "FormulaSegment",
