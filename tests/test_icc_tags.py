@@ -43,7 +43,7 @@ EXAMPLES = {
     "clrt": (
         ColorantTable((Colorant("X"), Colorant("n.x", (1, 0x8000, 0xFFFF)))),
         """
-        636c7274 00000000 00000002                                              # 'clrt', reserved, 2 colorants
+        636c7274 00000000 00000002                                              # 'clrt', reserved, 2 of them
         58000000 00000000 00000000 00000000 00000000 00000000 00000000 00000000 # 'X'
         0000 0000 0000                                                          # its colour is not said
         6e2e7800 00000000 00000000 00000000 00000000 00000000 00000000 00000000 # 'n.x'
