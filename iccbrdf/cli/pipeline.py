@@ -155,7 +155,7 @@ def arranged_channels(
     """The names to link by: those declared, else those in the file; None where there are neither.
 
     `own` are the first profile's.  Raises UsageError where the number of names or channels does not fit, or
-    where a name that was declared is unknown.
+    where a declared name is unknown or comes twice.
     """
     if declared is None and source.names is None and source.channels != len(own):
         raise UsageError(
@@ -169,4 +169,6 @@ def arranged_channels(
     for name in declared:
         if name not in own:
             raise UsageError(f"--channels: {name!r} is not in the first profile: {nearest(name, own)}")
+        if declared.count(name) > 1:
+            raise UsageError(f"--channels: {name!r} comes twice")
     return declared
