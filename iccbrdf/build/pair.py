@@ -15,25 +15,12 @@ import numpy as np
 from iccbrdf.brdf.primaries import Primaries
 from iccbrdf.build.listing import listing
 from iccbrdf.build.models import MODELS, Model
+from iccbrdf.build.profiles import Range, decoding, ranges, text_tags
 from iccbrdf.build.viewing import Viewing, viewing
 from iccbrdf.calc import Compiled, compile_template
 from iccbrdf.errors import UsageError, nearest
-from iccbrdf.icc import (
-    XYZ,
-    Calculator,
-    Header,
-    Matrix,
-    Mluc,
-    MultiProcess,
-    NumberArray,
-    Profile,
-    TagArray,
-)
+from iccbrdf.icc import XYZ, Calculator, Header, MultiProcess, NumberArray, Profile
 from iccbrdf.resources import folder
-
-COPYRIGHT = "No copyright, use freely"
-
-_NORMAL_RANGE = (-1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -110,10 +97,10 @@ def build_pair(
         variables=variables,
     )
     conditions = viewing(primaries.illuminant, primaries.observer, primaries.white)
-    ranges = _ranges(compiled.inputs, primaries.encoding)
-    mid = _mid(compiled.inputs, ranges, model.title)
+    limits = ranges(compiled.inputs, primaries.encoding)
+    mid = _mid(compiled.inputs, limits, model.title)
     mvis = _mvis(compiled, conditions, model.title)
-    return Pair(mid, mvis, listing(model.title, compiled, ranges, conditions), compiled)
+    return Pair(mid, mvis, listing(model.title, compiled, limits, conditions), compiled)
 
 
 def _check_names(what: str, names: Iterable[str], valid: Collection[str], model: Model) -> None:
@@ -122,26 +109,11 @@ def _check_names(what: str, names: Iterable[str], valid: Collection[str], model:
             raise UsageError(f"{model.title} has no {what} {name!r}: {nearest(name, valid)}")
 
 
-def _ranges(channels: Sequence[str], encoding: Mapping[str, float]) -> list[tuple[float, float]]:
-    """What the device values 0 and 1 of each channel stand for; `encoding` goes by family, `kd` of `kd.X`."""
-    families = [channel.partition(".")[0] for channel in channels]
-    return [_NORMAL_RANGE if family == "n" else (0.0, encoding.get(family, 1.0)) for family in families]
-
-
-def _mid(channels: Sequence[str], ranges: Sequence[tuple[float, float]], name: str) -> Profile:
+def _mid(channels: Sequence[str], limits: Sequence[Range], name: str) -> Profile:
     n = len(channels)
-    low, high = np.array(ranges, np.float32).T
-    decode = Matrix(inputs=n, matrix=np.diag(high - low), offset=low)
     header = Header(device_class="mid ", colour_space=f"nc{n:04x}", mcs=f"mc{n:04x}")
-    return Profile(
-        header,
-        {
-            "desc": Mluc.of(f"MID for {name}"),
-            "cprt": Mluc.of(COPYRIGHT),
-            "mcta": TagArray.of_texts(channels),
-            "A2M0": MultiProcess(n, n, (decode,)),
-        },
-    )
+    decode = MultiProcess(n, n, (decoding(limits),))
+    return Profile(header, {**text_tags(f"MID for {name}", channels), "A2M0": decode})
 
 
 def _mvis(compiled: Compiled, conditions: Viewing, name: str) -> Profile:
@@ -149,9 +121,7 @@ def _mvis(compiled: Compiled, conditions: Viewing, name: str) -> Profile:
     program = Calculator(inputs=n, outputs=3, program=compiled.program)
     header = Header(device_class="mvis", pcs="XYZ ", mcs=f"mc{n:04x}", illuminant=conditions.white)
     tags: dict[str, Any] = {
-        "desc": Mluc.of(f"MVIS for {name}, {conditions.text}"),
-        "cprt": Mluc.of(COPYRIGHT),
-        "mcta": TagArray.of_texts(compiled.inputs),
+        **text_tags(f"MVIS for {name}, {conditions.text}", compiled.inputs),
         "mdv ": NumberArray("fl32", np.array(compiled.defaults)),
         "wtpt": XYZ.of(*conditions.white),
         "M2B0": MultiProcess(n, 3, (program,)),

@@ -1,0 +1,46 @@
+"""What the profiles that are built here have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from iccbrdf.icc import Matrix, Mluc, TagArray
+
+COPYRIGHT = "No copyright, use freely"
+
+Range = tuple[float, float]
+"""What the device values 0 and 1 of a channel stand for."""
+
+NORMAL = ("n.x", "n.y", "n.z")
+_NORMAL_RANGE = (-1.0, 1.0)
+_XYZ_RANGE = (0.0, 65535 / 32768)  # u1.15: the largest 16-bit integer is almost 2
+
+
+def text_tags(description: str, channels: Iterable[str]) -> dict[str, Any]:
+    """Description, copyright and the names of the multiplex channels."""
+    return {
+        "desc": Mluc.of(description),
+        "cprt": Mluc.of(COPYRIGHT),
+        "mcta": TagArray.of_texts(channels),
+    }
+
+
+def ranges(channels: Sequence[str], encoding: Mapping[str, float]) -> list[Range]:
+    """The range of each channel: `encoding` goes by family (`kd` of `kd.X`), normals -1..1, XYZ as u1.15."""
+    known = {**dict.fromkeys(NORMAL, _NORMAL_RANGE), **dict.fromkeys("XYZ", _XYZ_RANGE)}
+    return [known.get(name, (0.0, encoding.get(name.partition(".")[0], 1.0))) for name in channels]
+
+
+def decoding(limits: Sequence[Range]) -> Matrix:
+    """Device values in 0..1 -> real values."""
+    low, high = np.array(limits, np.float32).T
+    return Matrix(inputs=len(limits), matrix=np.diag(high - low), offset=low)
+
+
+def encoding(limits: Sequence[Range]) -> Matrix:
+    """Real values -> device values in 0..1."""
+    low, high = np.array(limits, np.float64).T
+    return Matrix(inputs=len(limits), matrix=np.diag(1 / (high - low)), offset=-low / (high - low))
