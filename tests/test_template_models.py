@@ -7,7 +7,7 @@ import pytest
 
 from iccbrdf.calc.compiler import compile_template
 from iccbrdf.calc.interpreter import run
-from iccbrdf.calc.lower import lower
+from iccbrdf.calc.lower import Settings, lower
 from iccbrdf.calc.source import parse
 from iccbrdf.resources import folder
 
@@ -177,7 +177,7 @@ def test_every_combination_of_effects_is_a_model(model):
     effects = compiled(model).effects
     for switches in itertools.product((True, False), repeat=len(effects)):
         chosen = dict(zip(effects, switches, strict=True))
-        lowered = lower(template, {}, chosen, {})
+        lowered = lower([template], Settings(effects=chosen))
         assert lowered.effects == chosen
         assert lowered.outputs == ["X", "Y", "Z"]
 

@@ -3,7 +3,7 @@
 Knows no files and no BRDF.
 """
 
-from iccbrdf.calc.compiler import Compiled, compile_template
+from iccbrdf.calc.compiler import Compiled, compile_chain, compile_template
 from iccbrdf.calc.interpreter import run
 from iccbrdf.calc.operators import OPERATORS
 from iccbrdf.calc.program import Op, Program, decode_ops, encode_ops, listing, parse
@@ -15,6 +15,7 @@ __all__ = [
     "Compiled",
     "Op",
     "Program",
+    "compile_chain",
     "compile_template",
     "decode_ops",
     "encode_ops",

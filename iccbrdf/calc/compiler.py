@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from numpy.typing import ArrayLike
+
 from iccbrdf.calc.emit import emit
 from iccbrdf.calc.graph import Graph
-from iccbrdf.calc.lower import lower
+from iccbrdf.calc.lower import Settings, lower
 from iccbrdf.calc.passes import Report, optimise
 from iccbrdf.calc.program import Program
 from iccbrdf.calc.source import parse
@@ -18,14 +20,15 @@ from iccbrdf.errors import InputError
 @dataclass(frozen=True)
 class Compiled:
     """
-    A compiled template.
+    A compiled template, or a chain of them.
 
-    model: its name.  documentation: the comment at its head.
+    model: its name, or their names.  documentation: the comment at the head.
     program: the operators; none but those that every implementation of ICC.2 has.
     inputs, outputs: channel names in order.  defaults: one number for each input, what a print that lacks
         the channel has.
     variables: run-time (CMM environment) variables and the value of each where it is undefined.
-    constants: compile-time constants (tuples of numbers) and choices (names) as they were used.
+    constants: compile-time constants (tuples of numbers, tables row by row) and choices (names) as they were
+        used.
     effects: all switches of the template, on or off.
     executed: operators on the longest path for one pixel, every 8-byte operator counted.
     graph: what the program computes.  report: what each pass did.
@@ -49,7 +52,7 @@ def compile_template(
     text: str,
     *,
     filename: str,
-    constants: Mapping[str, float | Sequence[float] | str] | None = None,
+    constants: Mapping[str, ArrayLike] | None = None,
     effects: Mapping[str, bool] | None = None,
     variables: Mapping[str, float] | None = None,
 ) -> Compiled:
@@ -59,12 +62,13 @@ def compile_template(
     Parameters
     ----------
     text
-        The template; the language is described in iccbrdf.calc.source and iccbrdf.calc.lower.
+        The template; the language is described in iccbrdf.calc.source and iccbrdf.calc.expressions.
     filename
         For messages.
     constants
         Constants (a number, or as many as the default has) and choices (a name) that differ from the
-        template's defaults.  Folded in float64, rounded to float32 once, where they are written.
+        template's defaults, and all its tables (numbers of shape (rows,) or (rows, columns)).  Folded in
+        float64, rounded to float32 once, where they are written.
     effects
         Switches that differ from the template's defaults.
     variables
@@ -74,20 +78,52 @@ def compile_template(
     Raises
     ------
     InputError
-        An error in the template at file:line:column, or a constant, choice, effect or run-time variable
-        that it does not declare, with the nearest that it does.
+        An error in the template at file:line:column, a table that is not given, or a constant, choice,
+        effect or run-time variable that it does not declare, with the nearest that it does.
     """
+    return compile_chain([(text, filename)], constants=constants, effects=effects, variables=variables)
+
+
+def compile_chain(
+    templates: Sequence[tuple[str, str]],
+    *,
+    constants: Mapping[str, ArrayLike] | None = None,
+    effects: Mapping[str, bool] | None = None,
+    variables: Mapping[str, float] | None = None,
+) -> Compiled:
+    """
+    Compile templates that work one after the other into one program.
+
+    An input of a template is what an earlier template has written to the channel of that name, or else the
+    program's input of that name; what no earlier template reads or writes thus passes by it.  The program
+    gives the outputs of the last template.
+
+    Parameters
+    ----------
+    templates
+        Text and filename of each.
+    constants, effects, variables
+        As of `compile_template`; each goes to all templates that declare it.
+
+    Raises
+    ------
+    InputError
+        As `compile_template`, or no template.
+    """
+    if not templates:
+        raise InputError("found no template to compile, expected one or more")
+    filenames = ", ".join(filename for _, filename in templates)
     try:
-        template = parse(text, filename)
-        lowered = lower(template, constants or {}, effects or {}, variables or {})
+        parsed = [parse(text, filename) for text, filename in templates]
+        lowered = lower(parsed, Settings(constants or {}, effects or {}, variables or {}))
     except RecursionError:
-        raise InputError(f"{filename}: expressions are nested too deeply; use `let` for parts") from None
+        raise InputError(f"{filenames}: expressions are nested too deeply; use `let` for parts") from None
     graph, report = optimise(lowered.graph)
     program = emit(graph)
-    checked = verify(program, len(lowered.inputs), len(lowered.outputs), where=filename)
+    checked = verify(program, len(lowered.inputs), len(lowered.outputs), where=filenames)
     return Compiled(
-        model=lowered.model,
-        documentation=template.documentation,
+        model=" ".join(lowered.models),
+        documentation="\n\n".join(template.documentation for template in parsed),
         program=program,
         inputs=tuple(lowered.inputs),
         defaults=tuple(lowered.defaults),

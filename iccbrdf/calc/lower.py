@@ -1,75 +1,48 @@
-"""Syntax tree to graph: names, widths, functions, and the statements that the build's switches choose.
+"""Syntax tree to graph: what templates declare, and the statements that the build's switches choose.
 
-Functions of the language, element by element unless said, scalars going with vectors of any length:
-`abs sign sqrt cbrt exp log log10 floor ceil trunc round sin cos tan asin acos atan` of one value;
-`pow mod min max atan2(y, x)` of two, `clamp(x, low, high)`; of one vector to a scalar `sum product min max`
-and `norm`; `dot(a, b)`, `cross(a, b)`, `normalize(v)` (a vector of no length becomes 0) and
-`rotl(v, k)` (the components rotated, component k first).  Angles are in radians, `log` is natural,
-conditions are 1 and 0, and `pi` is a name that is always there.
+Several templates make one graph, as a chain: an input reads what an earlier template has written to the
+channel of that name, or else the program's own input of that name, which all templates share.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from iccbrdf.calc.expressions import Expressions, Named, Rows, bind
 from iccbrdf.calc.graph import Graph, Node
-from iccbrdf.calc.passes import optimise
 from iccbrdf.calc.source import (
-    Block,
-    Call,
     Choice,
-    Component,
-    Conditional,
     Constant,
     Def,
     Effect,
-    Expression,
     Input,
     Let,
     Model,
-    Name,
-    Number,
     Output,
-    Place,
     Runtime,
     Statement,
+    Table,
     Template,
     Variable,
-    Vector,
     When,
 )
 from iccbrdf.errors import InputError, nearest
 
-TINY = 1e-37
-"""What `normalize` adds to a squared length, so that a vector of no length becomes 0 and not NaN.
-
-Above the smallest normal float32, and far below the square of any length that a direction has.
-"""
-
 RESERVED_VARIABLES = ("true", "ndef")
 """Names of run-time variables that ICC.2 gives a fixed meaning."""
-
-_COMPONENTS = {"x": 0, "y": 1, "z": 2, "X": 0, "Y": 1, "Z": 2}
-
-_EACH = {
-    "neg": "neg", "not": "not", "abs": "abs", "sign": "sign", "sqrt": "sqrt", "cbrt": "cbrt", "exp": "exp",
-    "log": "ln", "log10": "log", "floor": "flor", "ceil": "ceil", "trunc": "trnc", "round": "rond",
-    "sin": "sin", "cos": "cos", "tan": "tan", "asin": "asin", "acos": "acos", "atan": "atan",
-    "+": "add", "-": "sub", "*": "mul", "/": "div", "^": "pow", "pow": "pow", "mod": "mod",
-    "<": "lt", "<=": "le", "==": "eq", "!=": "neq", ">=": "ge", ">": "gt", "and": "vand", "or": "vor",
-}  # fmt: skip
-"""Functions and operators of the language that are one operator of the calculator."""
 
 
 @dataclass
 class Lowered:
-    """A template as a graph, and what it declares."""
+    """Templates as a graph, and what they declare; `outputs` are the last one's."""
 
-    model: str = ""
+    models: list[str] = field(default_factory=list)
     graph: Graph = field(default_factory=Graph)
     inputs: list[str] = field(default_factory=list)
     defaults: list[float] = field(default_factory=list)
@@ -77,74 +50,90 @@ class Lowered:
     variables: dict[str, float] = field(default_factory=dict)
     constants: dict[str, tuple[float, ...] | str] = field(default_factory=dict)
     effects: dict[str, bool] = field(default_factory=dict)
+    channels: dict[str, Node] = field(default_factory=dict)
+    """What each channel holds after the last template."""
 
 
-def lower(
-    template: Template,
-    constants: Mapping[str, float | Sequence[float] | str],
-    effects: Mapping[str, bool],
-    variables: Mapping[str, float],
-) -> Lowered:
+@dataclass(frozen=True)
+class Settings:
+    """What the build sets.
+
+    constants: values that replace the defaults of constants (numbers, one or as many as the default has), the
+        numbers of tables, and the names of choices.
+    effects: switches that differ from the template's own settings.
+    variables: values of run-time variables where they are undefined, which replace the defaults.
     """
-    Return the graph of a template.
 
-    Parameters
-    ----------
-    template
-        The syntax tree.
-    constants
-        Values that replace the defaults of constants (numbers, one or as many as the default has) and of
-        choices (names).
-    effects
-        Switches that differ from the template's own settings.
-    variables
-        Values of run-time variables where they are undefined, which replace the defaults.
+    constants: Mapping[str, ArrayLike] = field(default_factory=dict)
+    effects: Mapping[str, bool] = field(default_factory=dict)
+    variables: Mapping[str, float] = field(default_factory=dict)
+
+
+def lower(templates: Sequence[Template], settings: Settings) -> Lowered:
+    """
+    Return the graph of a chain of templates.
 
     Raises
     ------
     InputError
-        Names that are not declared, widths that do not fit, at their place in the template.
+        Settings that no template declares, names that are not declared, widths that do not fit, at their
+        place in the template.
     """
-    return _Lowering(template, constants, effects, variables).run()
+    _check_settings(templates, settings)
+    result = Lowered()
+    for template in templates:
+        _Lowering(template, settings, result).run()
+    return result
 
 
-@dataclass(frozen=True)
-class _Function:
-    """A function of the template, with the names it saw when it was defined."""
+def _check_settings(templates: Sequence[Template], settings: Settings) -> None:
+    """Settings may name what an inactive `when` declares, so look at all statements."""
+    statements = [statement for template in templates for statement in template.all_statements()]
+    constants = [s.name for s in statements if isinstance(s, Constant | Table | Choice)]
+    effects = [s.name for s in statements if isinstance(s, Effect)]
+    variables = [v.name for s in statements if isinstance(s, Runtime) for v in s.variables]
+    given: tuple[tuple[str, Mapping[str, Any], list[str]], ...] = (
+        ("constant", settings.constants, constants),
+        ("effect", settings.effects, effects),
+        ("run-time variable", settings.variables, variables),
+    )
+    for what, names, declared in given:
+        for name in names:
+            if name not in declared:
+                where = ", ".join(template.filename for template in templates)
+                raise InputError(f"{where}: no {what} {name!r} is declared; {nearest(name, declared)}")
 
-    definition: Def
-    names: dict[str, Node]
 
-
-def _numbers(given: float | Sequence[float] | str) -> tuple[float, ...] | None:
-    """A setting as finite numbers; None if it is anything else."""
+def _numbers(given: ArrayLike, dimensions: int) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+    """A setting as finite numbers, of 0 dimensions taken for 1; None if it is anything else."""
     try:
-        values = np.atleast_1d(np.asarray(given)).astype(np.float64, casting="safe")
-    except TypeError:
+        values = np.asarray(given).astype(np.float64, casting="safe")
+    except (TypeError, ValueError):
         return None
-    return tuple(values.tolist()) if values.ndim == 1 and np.all(np.isfinite(values)) else None
+    if values.ndim == 0:
+        values = values[np.newaxis]
+    return values if values.ndim == dimensions and values.size and np.all(np.isfinite(values)) else None
 
 
 class _Lowering:
-    def __init__(
-        self,
-        template: Template,
-        constants: Mapping[str, float | Sequence[float] | str],
-        effects: Mapping[str, bool],
-        variables: Mapping[str, float],
-    ) -> None:
-        self._template = template
-        self._constants = constants
-        self._effects = effects
-        self._variables = variables
-        self._result = Lowered()
-        self._graph = self._result.graph
-        self._globals: dict[str, Node] = {"pi": self._graph.const(math.pi)}
-        self._functions: dict[str, _Function] = {}
-        self._expanding: list[str] = []
+    """One template of the chain, whose graph and declarations go to `result`."""
 
-    def run(self) -> Lowered:
-        self._check_settings()
+    def __init__(self, template: Template, settings: Settings, result: Lowered) -> None:
+        self._template = template
+        self._constants = settings.constants
+        self._effects = settings.effects
+        self._variables = settings.variables
+        self._result = result
+        self._graph = result.graph
+        self._expressions = Expressions(result.graph)
+        self._globals: dict[str, Named] = {"pi": self._graph.const(math.pi)}
+        self._read: set[str] = set()
+        self._written: dict[str, Node] = {}
+        self._declared_variables: set[str] = set()
+        self._sizes: dict[str, tuple[int, str]] = {}
+
+    def run(self) -> None:
+        models = len(self._result.models)
         outputs: list[Node] = []
         for statement in self._chosen(self._template.statements):
             if isinstance(statement, Output):
@@ -153,29 +142,13 @@ class _Lowering:
                 self._declare(statement)
         if not outputs:
             raise InputError(f"{self._template.filename}: no output; expected `output X Y Z = ...`")
-        if not self._result.model:
+        if len(self._result.models) == models:
             raise InputError(f"{self._template.filename}: no name; expected `model NAME`")
+        self._result.channels |= self._written
+        self._result.outputs = list(self._written)
         self._graph.outputs = tuple(outputs)
-        return self._result
 
     # What the build sets -------------------------------------------------------------------------------
-
-    def _check_settings(self) -> None:
-        """Settings may name what an inactive `when` declares, so look at all statements."""
-        statements = list(self._template.all_statements())
-        constants = [s.name for s in statements if isinstance(s, Constant | Choice)]
-        effects = [s.name for s in statements if isinstance(s, Effect)]
-        variables = [v.name for s in statements if isinstance(s, Runtime) for v in s.variables]
-        settings = (
-            ("constant", self._constants, constants),
-            ("effect", self._effects, effects),
-            ("run-time variable", self._variables, variables),
-        )
-        for what, given, declared in settings:
-            for name in given:
-                if name not in declared:
-                    hint = nearest(name, declared)
-                    raise InputError(f"{self._template.filename}: no {what} {name!r} is declared; {hint}")
 
     def _chosen(self, statements: Sequence[Statement]) -> list[Statement]:
         """Declares switches and choices on the way and replaces each `when` by the side it chooses."""
@@ -217,40 +190,44 @@ class _Lowering:
 
     def _declare(self, statement: Statement) -> None:
         if isinstance(statement, Model):
-            self._result.model = statement.name
+            self._result.models.append(statement.name)
         elif isinstance(statement, Input):
-            self._bind(self._globals, statement.place, statement.name, self._input(statement))
+            bind(self._globals, statement.place, statement.name, self._input(statement))
         elif isinstance(statement, Runtime):
             variables = [self._variable(variable) for variable in statement.variables]
             value = variables[0] if len(variables) == 1 else self._graph.pack(variables)
-            self._bind(self._globals, statement.place, statement.name, value)
+            bind(self._globals, statement.place, statement.name, value)
         elif isinstance(statement, Constant):
-            self._bind(self._globals, statement.place, statement.name, self._constant(statement))
+            bind(self._globals, statement.place, statement.name, self._constant(statement))
+        elif isinstance(statement, Table):
+            bind(self._globals, statement.place, statement.name, self._table(statement))
         elif isinstance(statement, Let):
-            value = self._value(statement.value, self._globals)
-            self._bind(self._globals, statement.place, statement.name, value)
+            value = self._expressions.value(statement.value, self._globals)
+            bind(self._globals, statement.place, statement.name, value)
         elif isinstance(statement, Def):
-            self._define(statement)
-
-    def _bind(self, names: dict[str, Node], place: Place, name: str, value: Node) -> None:
-        if name in names:
-            raise place.error(f"{name!r} has a value already; a name stands for one value")
-        names[name] = value
+            self._expressions.define(statement, self._globals)
 
     def _input(self, declared: Input) -> Node:
         default = (0.0,) * declared.width
         if declared.default is not None:
-            default = self._known(declared.default, f"the default of {declared.name}")
+            default = self._expressions.known(
+                declared.default, self._globals, f"the default of {declared.name}"
+            )
         if len(default) not in (1, declared.width):
             found = f"the default of {declared.name} has {len(default)} components"
             raise declared.place.error(f"{found}, expected 1 or {declared.width}")
         for channel in declared.channels:
-            if channel in self._result.inputs:
+            if channel in self._read:
                 raise declared.place.error(f"channel {channel!r} is read by an input already")
-        first = len(self._result.inputs)
-        self._result.inputs.extend(declared.channels)
-        self._result.defaults.extend(default * (declared.width // len(default)))
-        return self._graph.input(first, declared.width)
+        self._read.update(declared.channels)
+        parts = []
+        for channel, value in zip(declared.channels, default * (declared.width // len(default)), strict=True):
+            if channel not in self._result.channels:
+                self._result.channels[channel] = self._graph.input(len(self._result.inputs))
+                self._result.inputs.append(channel)
+                self._result.defaults.append(value)
+            parts.append(self._result.channels[channel])
+        return parts[0] if len(parts) == 1 else self._graph.pack(parts)
 
     def _variable(self, declared: Variable) -> Node:
         name = declared.name
@@ -259,213 +236,67 @@ class _Lowering:
                 f"{name!r} cannot be a run-time variable; expected at most 4 characters and none of "
                 + ", ".join(RESERVED_VARIABLES)
             )
-        if name in self._result.variables:
+        if name in self._declared_variables:
             raise declared.place.error(f"run-time variable {name!r} is declared already")
-        default = self._known(declared.default, f"the default of {name}")
+        self._declared_variables.add(name)
+        default = self._expressions.known(declared.default, self._globals, f"the default of {name}")
         if len(default) != 1:
             raise declared.place.error(f"the default of {name} has {len(default)} components, expected 1")
-        given = _numbers(self._variables.get(name, default[0]))
+        given = _numbers(self._variables.get(name, default[0]), 1)
         if given is None or len(given) != 1:
             raise declared.place.error(f"{name} is {self._variables[name]!r}; expected 1 finite number")
-        self._result.variables[name] = given[0]
-        return self._graph.env(name, given[0])
+        self._result.variables[name] = float(given[0])
+        return self._graph.env(name, float(given[0]))
 
     def _constant(self, declared: Constant) -> Node:
         name = declared.name
-        values = self._known(declared.default, f"the constant {name}")
+        values = self._expressions.known(declared.default, self._globals, f"the constant {name}")
         if name in self._constants:
-            given = _numbers(self._constants[name])
+            given = _numbers(self._constants[name], 1)
             if given is None or len(given) != len(values):
                 found = self._constants[name]
                 raise declared.place.error(f"{name} is {found!r}; expected {len(values)} finite number(s)")
-            values = given
+            values = tuple(given.tolist())
         self._result.constants[name] = values
         return self._graph.const(*values)
 
-    def _define(self, definition: Def) -> None:
-        if definition.name in self._functions or definition.name in FUNCTIONS or definition.name in _EACH:
-            raise definition.place.error(f"a function {definition.name!r} is there already")
-        self._functions[definition.name] = _Function(definition, dict(self._globals))
+    def _table(self, declared: Table) -> Named:
+        name, dimensions = declared.name, len(declared.sizes)
+        shape = ", ".join(declared.sizes)
+        if name not in self._constants:
+            raise declared.place.error(f"{name} is not given; expected finite numbers of shape ({shape})")
+        values = _numbers(self._constants[name], dimensions)
+        if values is None:
+            found = self._constants[name]
+            raise declared.place.error(f"{name} is {found!r}; expected finite numbers of shape ({shape})")
+        for size, length in zip(declared.sizes, values.shape, strict=True):
+            self._check_size(declared, size, length)
+        self._result.constants[name] = tuple(values.ravel().tolist())
+        if dimensions == 1:
+            return self._graph.const(*values)
+        return Rows(tuple(map(tuple, values.tolist())))
+
+    def _check_size(self, table: Table, size: str, length: int) -> None:
+        """Bind the name of a size to the first length that has it."""
+        if size.isdigit():
+            expected, reason = int(size), ""
+        elif size in self._sizes:
+            expected, other = self._sizes[size]
+            reason = f", as {other} has"
+        else:
+            bind(self._globals, table.place, size, self._graph.const(length))
+            self._sizes[size] = length, table.name
+            return
+        if length != expected:
+            what = "rows" if size == table.sizes[0] else "columns"
+            raise table.place.error(f"{table.name} has {length} {what}, expected {expected}{reason}")
 
     def _output(self, output: Output) -> Node:
         for channel in output.channels:
-            if channel in self._result.outputs:
+            if channel in self._written:
                 raise output.place.error(f"channel {channel!r} is written by an output already")
-        self._result.outputs.extend(output.channels)
-        value = self._value(output.value, self._globals)
-        return self._widen(value, len(output.channels), output.place)
-
-    def _known(self, expression: Expression, what: str) -> tuple[float, ...]:
-        """The numbers of an expression that the build already knows."""
-        value = self._value(expression, self._globals)
-        (folded,) = optimise(Graph(self._graph.nodes, (value,)))[0].outputs
-        if folded.op != "const":
-            raise expression.place.error(f"{what} depends on what only a run knows; expected constants")
-        return tuple(folded.detail)
-
-    # Expressions ---------------------------------------------------------------------------------------
-
-    def _value(self, expression: Expression, names: dict[str, Node]) -> Node:
-        if isinstance(expression, Number):
-            return self._graph.const(expression.value)
-        if isinstance(expression, Name):
-            if expression.name not in names:
-                hint = nearest(expression.name, names)
-                raise expression.place.error(f"nothing is named {expression.name!r}; {hint}")
-            return names[expression.name]
-        if isinstance(expression, Vector):
-            return self._graph.pack([self._value(part, names) for part in expression.parts])
-        if isinstance(expression, Component):
-            return self._component(expression, names)
-        if isinstance(expression, Block):
-            inner = dict(names)
-            for let in expression.lets:
-                self._bind(inner, let.place, let.name, self._value(let.value, inner))
-            return self._value(expression.value, inner)
-        if isinstance(expression, Conditional):
-            return self._conditional(expression, names)
-        return self._call(expression, names)
-
-    def _component(self, component: Component, names: dict[str, Node]) -> Node:
-        vector = self._value(component.vector, names)
-        if component.name.isdigit():
-            index = int(component.name)
-        elif component.name in _COMPONENTS:
-            index = _COMPONENTS[component.name]
-        else:
-            hint = nearest(component.name, _COMPONENTS)
-            raise component.place.error(f"no component is named {component.name!r}; {hint}")
-        if index >= vector.width:
-            raise component.place.error(
-                f"found component {component.name} of a value of {vector.width} component(s)"
-            )
-        return self._graph.pick(vector, index)
-
-    def _conditional(self, conditional: Conditional, names: dict[str, Node]) -> Node:
-        condition = self._value(conditional.condition, names)
-        if condition.width != 1:
-            raise conditional.condition.place.error(
-                f"the condition has {condition.width} components, expected 1"
-            )
-        sides = [self._value(conditional.then, names), self._value(conditional.otherwise, names)]
-        return self._graph.add("select", [condition, *self._alike(sides, conditional.place, "if")])
-
-    def _call(self, call: Call, names: dict[str, Node]) -> Node:
-        name = call.function
-        arguments = [self._value(argument, names) for argument in call.arguments]
-        if name in self._functions:
-            return self._expanded(self._functions[name], call, arguments)
-        if name in _EACH:
-            count = 1 if name in _UNARY else 2
-            self._expect_arguments(call, (count,))
-            return self._graph.add(_EACH[name], self._alike(arguments, call.place, name))
-        if name in FUNCTIONS:
-            counts, build = FUNCTIONS[name]
-            self._expect_arguments(call, counts)
-            return build(self, call, arguments)
-        known = [f for f in (*_EACH, *FUNCTIONS, *self._functions) if f.isidentifier()]
-        raise call.place.error(f"no function is named {name!r}; {nearest(name, known)}")
-
-    def _expanded(self, function: _Function, call: Call, arguments: Sequence[Node]) -> Node:
-        definition = function.definition
-        self._expect_arguments(call, (len(definition.parameters),))
-        if definition.name in self._expanding:
-            raise call.place.error(f"{definition.name} calls itself; there is no recursion")
-        names = {**function.names, **dict(zip(definition.parameters, arguments, strict=True))}
-        self._expanding.append(definition.name)
-        value = self._value(definition.body, names)
-        self._expanding.pop()
+        value = self._expressions.value(output.value, self._globals)
+        value = self._expressions.widen(value, len(output.channels), output.place)
+        for index, channel in enumerate(output.channels):
+            self._written[channel] = self._graph.pick(value, index)
         return value
-
-    def _expect_arguments(self, call: Call, counts: tuple[int, ...]) -> None:
-        if len(call.arguments) not in counts:
-            expected = " or ".join(map(str, counts))
-            found = f"{call.function} has {len(call.arguments)} argument(s)"
-            raise call.place.error(f"{found}, expected {expected}")
-
-    def _alike(self, values: Sequence[Node], place: Place, what: str) -> list[Node]:
-        """The values at one width: scalars repeated to the vectors' length."""
-        width = max(value.width for value in values)
-        if any(value.width not in (1, width) for value in values):
-            widths = " and ".join(str(value.width) for value in values)
-            raise place.error(f"{what!r} of vectors of {widths} components, expected equal lengths")
-        return [self._widen(value, width, place) for value in values]
-
-    def _widen(self, value: Node, width: int, place: Place) -> Node:
-        if value.width == width:
-            return value
-        if value.width != 1:
-            raise place.error(f"found {value.width} components, expected {width}")
-        return self._graph.splat(value, width)
-
-    # Functions made of several operators ---------------------------------------------------------------
-
-    def _reduce(self, op: str, vector: Node) -> Node:
-        return vector if vector.width == 1 else self._graph.add(op, [vector])
-
-    def _least_or_greatest(self, call: Call, arguments: Sequence[Node]) -> Node:
-        if len(arguments) == 1:
-            return self._reduce(call.function, arguments[0])
-        return self._graph.add(f"v{call.function}", self._alike(arguments, call.place, call.function))
-
-    def _sum(self, call: Call, arguments: Sequence[Node]) -> Node:
-        return self._reduce("sum", arguments[0])
-
-    def _product(self, call: Call, arguments: Sequence[Node]) -> Node:
-        return self._reduce("prod", arguments[0])
-
-    def _atan2(self, call: Call, arguments: Sequence[Node]) -> Node:
-        y, x = self._alike(arguments, call.place, call.function)
-        return self._graph.add("atn2", [x, y])
-
-    def _clamp(self, call: Call, arguments: Sequence[Node]) -> Node:
-        value, low, high = self._alike(arguments, call.place, call.function)
-        return self._graph.add("vmin", [self._graph.add("vmax", [value, low]), high])
-
-    def _dot(self, call: Call, arguments: Sequence[Node]) -> Node:
-        return self._reduce("sum", self._graph.add("mul", self._alike(arguments, call.place, call.function)))
-
-    def _norm(self, call: Call, arguments: Sequence[Node]) -> Node:
-        return self._graph.add("sqrt", [self._reduce("sum", self._graph.add("sq", arguments))])
-
-    def _normalize(self, call: Call, arguments: Sequence[Node]) -> Node:
-        graph, vector = self._graph, arguments[0]
-        squares = graph.pack([graph.add("sq", [vector]), graph.const(TINY)])
-        length = graph.add("sqrt", [graph.add("sum", [squares])])
-        return graph.add("div", [vector, graph.splat(length, vector.width)])
-
-    def _cross(self, call: Call, arguments: Sequence[Node]) -> Node:
-        graph = self._graph
-        a, b = arguments
-        if a.width != 3 or b.width != 3:
-            raise call.place.error(f"cross of {a.width} and {b.width} components, expected 3 and 3")
-        # a x b rotated by one place is a rotl(b) - rotl(a) b, which vector operators do in few steps.
-        ahead = graph.add("mul", [a, graph.rotl(b, 1)])
-        behind = graph.add("mul", [graph.rotl(a, 1), b])
-        return graph.rotl(graph.add("sub", [ahead, behind]), 1)
-
-    def _rotl(self, call: Call, arguments: Sequence[Node]) -> Node:
-        vector, places = arguments
-        if places.op != "const" or places.width != 1 or places.detail[0] not in range(1, vector.width):
-            raise call.place.error(f"rotl by something else than a number from 1 to {vector.width - 1}")
-        return self._graph.rotl(vector, int(places.detail[0]))
-
-
-_UNARY = frozenset(name for name in _EACH if name.isidentifier()) - {"pow", "mod", "and", "or"}
-
-_Build = Callable[[_Lowering, Call, Sequence[Node]], Node]
-
-FUNCTIONS: Mapping[str, tuple[tuple[int, ...], _Build]] = {
-    "min": ((1, 2), _Lowering._least_or_greatest),
-    "max": ((1, 2), _Lowering._least_or_greatest),
-    "sum": ((1,), _Lowering._sum),
-    "product": ((1,), _Lowering._product),
-    "atan2": ((2,), _Lowering._atan2),
-    "clamp": ((3,), _Lowering._clamp),
-    "dot": ((2,), _Lowering._dot),
-    "norm": ((1,), _Lowering._norm),
-    "normalize": ((1,), _Lowering._normalize),
-    "cross": ((2,), _Lowering._cross),
-    "rotl": ((2,), _Lowering._rotl),
-}
-"""Functions made of several operators: possible numbers of arguments, and how they are built."""

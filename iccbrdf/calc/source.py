@@ -9,6 +9,8 @@ documentation, `#` starts a comment, a newline ends a statement except inside pa
     runtime litI = pi                            a CMM environment variable and its default
     runtime view = (vueX: 0, vueY: 0, vueZ: 1)   several as one vector
     constant refractive_index = 1.5              set when the profile is built
+    constant angles[s]                           a table of any length: s numbers, and s stands for the length
+    constant colours[s, 3]                       s rows of 3; tables that name a size alike have it in common
     choice fresnel_angle = theta_i | alpha       the same for one of several names; the first is the default
     effect fresnel = on                          a switch of the build
     when fresnel { ... } else { ... }            statements chosen by a switch
@@ -17,9 +19,12 @@ documentation, `#` starts a comment, a newline ends a statement except inside pa
     def pow5(x) = x^5                            a function, expanded where it is called
     output X Y Z = if cos_i > 0 { ... } else { 0 }
 
-Operators by precedence: `or`, `and`, `not`, comparisons, `+ -`, `* /`, sign, `^`.  `(a, b, c)` is a vector,
-`v.x`, `v.Y` and `v[2]` are components, `if` is an expression whose blocks are `let` statements and a value.
-The functions are listed in lower.py.
+Operators by precedence: `or`, `and`, `not`, comparisons, `+ -`, `* / @`, sign, `^`.  `(a, b, c)` is a vector,
+`v.x`, `v.Y` and `v[2]` are components, `v[a:b]` those from a up to, but without b.  `if` is an expression
+whose blocks are `let` statements and a value; `total k = 1 to 3 { ... }` adds up the block's values for each
+k.  Of a table of rows, `colours.X` is a column, `colours[0]` a row, and `w @ colours` the sum of its rows,
+each times its component of w.  Indices and the bounds of `total` are known when the profile is built.
+The functions are listed in expressions.py.
 """
 
 from __future__ import annotations
@@ -83,7 +88,23 @@ class Component:
     place: Place
     vector: Expression
     name: str
-    """A letter, or the digits of an index."""
+    """A letter."""
+
+
+@dataclass(frozen=True)
+class Element:
+    place: Place
+    vector: Expression
+    index: Expression
+
+
+@dataclass(frozen=True)
+class Slice:
+    place: Place
+    vector: Expression
+    first: Expression
+    end: Expression
+    """The component after the last."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +122,18 @@ class Conditional:
     otherwise: Expression
 
 
-Expression: TypeAlias = Number | Name | Call | Vector | Component | Block | Conditional
+@dataclass(frozen=True)
+class Total:
+    place: Place
+    name: str
+    first: Expression
+    last: Expression
+    body: Block
+
+
+Expression: TypeAlias = (
+    Number | Name | Call | Vector | Component | Element | Slice | Block | Conditional | Total
+)
 
 # Statements --------------------------------------------------------------------------------------------
 
@@ -150,6 +182,16 @@ class Constant:
 
 
 @dataclass(frozen=True)
+class Table:
+    """A constant without a default, whose size the build decides."""
+
+    place: Place
+    name: str
+    sizes: tuple[str, ...]
+    """Number of rows, and of columns where there are any: names, or the digits of a number."""
+
+
+@dataclass(frozen=True)
 class Choice:
     place: Place
     name: str
@@ -189,7 +231,7 @@ class Def:
 
 
 Statement: TypeAlias = (
-    Model | Input | Output | Runtime | Constant | Choice | Effect | When | Let | Def
+    Model | Input | Output | Runtime | Constant | Table | Choice | Effect | When | Let | Def
 )
 
 
@@ -269,11 +311,12 @@ def _parser() -> Lark:
     )  # fmt: skip
 
 
+_OPERATORS = ("OR", "AND", "COMPARE", "PLUS", "MINUS", "TIMES", "DIVIDE", "COMBINE", "POWER")
 _DESCRIPTIONS = {
     "NAME": "a name",
     "NUMBER": "a number",
     "_NL": "the end of the line",
-    **dict.fromkeys(("OR", "AND", "COMPARE", "PLUS", "MINUS", "TIMES", "DIVIDE", "POWER"), "an operator"),
+    **dict.fromkeys(_OPERATORS, "an operator"),
 }
 
 
@@ -352,6 +395,13 @@ class _Builder(Transformer[Token, Any]):
     def constant(self, meta: Any, name: Token, default: Expression) -> Constant:
         return Constant(self._place(meta), str(name), default)
 
+    def table(self, meta: Any, name: Token, rows: Token, columns: Token | None) -> Table:
+        sizes = [rows] if columns is None else [rows, columns]
+        for size in sizes:
+            if size.type == "NUMBER":
+                self._index(size)
+        return Table(self._place(meta), str(name), tuple(map(str, sizes)))
+
     def choice(self, meta: Any, name: Token, *values: Token) -> Choice:
         return Choice(self._place(meta), str(name), tuple(map(str, values)))
 
@@ -380,6 +430,9 @@ class _Builder(Transformer[Token, Any]):
     ) -> Conditional:
         return Conditional(self._place(meta), condition, then, otherwise)
 
+    def summation(self, meta: Any, name: Token, first: Expression, last: Expression, body: Block) -> Total:
+        return Total(self._place(meta), str(name), first, last, body)
+
     def operation(self, meta: Any, first: Expression, *rest: Any) -> Expression:
         """`a - b + c`, grouped from the left."""
         value = first
@@ -394,8 +447,11 @@ class _Builder(Transformer[Token, Any]):
     def component(self, meta: Any, vector: Expression, name: Token) -> Component:
         return Component(self._place(meta), vector, str(name))
 
-    def element(self, meta: Any, vector: Expression, index: Token) -> Component:
-        return Component(self._place(meta), vector, str(self._index(index)))
+    def element(self, meta: Any, vector: Expression, index: Expression) -> Element:
+        return Element(self._place(meta), vector, index)
+
+    def slice(self, meta: Any, vector: Expression, first: Expression, end: Expression) -> Slice:
+        return Slice(self._place(meta), vector, first, end)
 
     def number(self, meta: Any, digits: Token) -> Number:
         return Number(self._place(meta), float(digits))
