@@ -1,4 +1,4 @@
-"""The scene of `iccbrdf demo`: a relief print of a real landscape, as a BRDF image.
+"""The scene of `iccbrdf demo`: a relief print of a real landscape, as an image.
 
 Heights: the digital elevation model of the Jacksboro fault, Tennessee, that comes with matplotlib.
 Colours: elevation tints of FOGRA39 inks; gloss: two measured paints, matt in the valleys and a little
@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from iccbrdf.brdf.models import MODELS
 from iccbrdf.brdf.primaries import Primaries
+from iccbrdf.build.profiles import NORMAL, XYZ_RANGE
 from iccbrdf.images.normals import height_to_normals
 
 PRINT_WIDTH = 200.0
@@ -27,11 +28,19 @@ _METRES_PER_DEGREE = 111_320.0
 
 
 @dataclass(frozen=True)
-class Scene:
-    """A BRDF image: device values in 0..1, (height, width, channels), and names of the channels."""
+class Image:
+    """Device values in 0..1, (height, width, channels), and names of the channels."""
 
     device: npt.NDArray[np.float32]
     names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A relief print: as a BRDF image, and as the XYZ of the flat print; both with normals."""
+
+    brdf: Image
+    xyz: Image
 
 
 def landscape(primaries: Primaries) -> Scene:
@@ -40,9 +49,16 @@ def landscape(primaries: Primaries) -> Scene:
     normals = height_to_normals(heights * EXAGGERATION, pitch)
     level = (heights - heights.min()) / np.ptp(heights)
     steps = np.linspace(0, 1, len(primaries.primaries))
-    tints = np.stack([np.interp(level, steps, column) for column in primaries.parameters.T], axis=-1)
-    device = np.concatenate([tints / primaries.scales, (normals + 1) / 2], axis=-1, dtype=np.float32)
-    return Scene(device, (*MODELS[primaries.model].channels, "n.x", "n.y", "n.z"))
+
+    def image(tints: npt.NDArray[np.float64], names: tuple[str, ...]) -> Image:
+        columns = [np.interp(level, steps, column) for column in tints.T]
+        device = np.stack([*columns, *np.moveaxis((normals + 1) / 2, -1, 0)], axis=-1).astype(np.float32)
+        return Image(device, (*names, *NORMAL))
+
+    return Scene(
+        brdf=image(primaries.parameters / primaries.scales, MODELS[primaries.model].channels),
+        xyz=image(primaries.XYZ / XYZ_RANGE[1], ("X", "Y", "Z")),
+    )
 
 
 def _heights() -> tuple[npt.NDArray[np.float64], float]:

@@ -11,7 +11,9 @@ from iccbrdf.resources import folder
 
 PRIMARIES = folder("profiles") / "fogra39_gloss" / "primaries.json"
 WARD = folder("profiles") / "ward_painting" / "primaries.json"
-FILES = ["mid.icc", "mvis.icc", "mvis.txt"]
+SLOPES = PRIMARIES.with_name("slopes.json")
+PAIR = ["mid.icc", "mvis.icc", "mvis.txt"]
+FILES = [*PAIR, "colour-mid.icc", "brdf-link.icc", "colour-mid.txt"]
 
 
 def samples(channels: int) -> np.ndarray:
@@ -30,9 +32,9 @@ def environment(light, view) -> dict[str, float]:
 
 
 def test_text_and_files(run, tmp_path):
-    result = run("build", PRIMARIES, "-o", tmp_path / "new" / "out")
+    result = run("build", PRIMARIES, "-o", tmp_path / "new" / "out", "--slopes", SLOPES)
     assert (result.code, result.err) == (0, "")
-    assert sorted(os.listdir(tmp_path / "new" / "out")) == FILES
+    assert sorted(os.listdir(tmp_path / "new" / "out")) == sorted(FILES)
     assert result.out.startswith("brdf1: 136 operators, at most 134 run for a pixel\n")
     for name in FILES:
         assert str(tmp_path / "new" / "out" / name) in result.out
@@ -129,14 +131,14 @@ def test_folder_that_cannot_be_made(run, tmp_path):
 @pytest.mark.parametrize("existing", FILES)
 def test_nothing_is_overwritten_unasked(run, tmp_path, existing):
     (tmp_path / existing).write_text("mine")
-    result = run("build", PRIMARIES, "-o", tmp_path)
+    result = run("build", PRIMARIES, "-o", tmp_path, "--slopes", SLOPES)
     assert (result.code, result.out) == (2, "")
     assert f"{tmp_path / existing}: exists already" in result.err
     assert os.listdir(tmp_path) == [existing]
     assert (tmp_path / existing).read_text() == "mine"
 
-    assert run("build", PRIMARIES, "-o", tmp_path, "--force").code == 0
-    assert sorted(os.listdir(tmp_path)) == FILES
+    assert run("build", PRIMARIES, "-o", tmp_path, "--slopes", SLOPES, "--force").code == 0
+    assert sorted(os.listdir(tmp_path)) == sorted(FILES)
     assert (tmp_path / existing).read_bytes() == (PRIMARIES.parent / existing).read_bytes()
 
 
@@ -148,5 +150,31 @@ def test_all_files_or_none(run, tmp_path):
     result = run("build", PRIMARIES, "-o", tmp_path, "--force")
     assert result.code == 2
     assert "mvis.txt: cannot be written: it is not a regular file" in result.err
-    assert sorted(os.listdir(tmp_path)) == FILES
+    assert sorted(os.listdir(tmp_path)) == sorted(FILES)
     assert (tmp_path / "mvis.icc").read_bytes() == before
+
+
+def test_fewer_than_four_primaries_make_no_colour_mid(run, tmp_path):
+    result = run("build", WARD, "-o", tmp_path / "pair")
+    assert (result.code, result.err) == (0, "")
+    assert sorted(os.listdir(tmp_path / "pair")) == PAIR
+    assert "no colour MID: 1 primaries, 4 are needed" in result.out
+
+    asked = run("build", WARD, "-o", tmp_path / "colour", "--interpolation", "smooth")
+    assert (asked.code, asked.out) == (3, "")
+    assert "4 to 16" in asked.err
+    assert not (tmp_path / "colour").exists()
+
+
+def test_a_slope_method_needs_slopes(run, tmp_path):
+    result = run("build", PRIMARIES, "-o", tmp_path / "out", "--slope-method", "published")
+    assert (result.code, result.out) == (2, "")
+    assert "--slopes" in result.err
+
+
+def test_slopes_under_another_light_are_refused(run, tmp_path):
+    text = SLOPES.read_text().replace('"D50"', '"D65"')
+    (tmp_path / "slopes.json").write_text(text)
+    result = run("build", PRIMARIES, "-o", tmp_path / "out", "--slopes", tmp_path / "slopes.json")
+    assert (result.code, result.out) == (3, "")
+    assert "illuminant: found 'D65', expected that of the primaries, 'D50'" in result.err

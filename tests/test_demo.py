@@ -34,21 +34,21 @@ def lit(scene):
     transform = iccbrdf.link([PRIMARIES.with_name("mid.icc"), PRIMARIES.with_name("mvis.icc")])
     return {
         side: transform.with_env(dict(zip(("litX", "litY", "litZ"), direction(50, azimuth), strict=True)))(
-            scene.device
+            scene.brdf.device
         )[..., 1]
         for side, azimuth in AZIMUTHS.items()
     }
 
 
 def test_scene_holds_device_values_and_unit_normals(scene):
-    height, width, channels = scene.device.shape
+    height, width, channels = scene.brdf.device.shape
     assert width == round(demo.PRINT_WIDTH / 0.6)
     assert 1 < height / width < 1.2  # 0.28 by 0.32 degrees at 36 degrees north
-    assert channels == len(scene.names) == 10
-    assert scene.device.dtype == np.float32
-    assert scene.device.min() >= 0
-    assert scene.device.max() <= 1
-    normals = 2 * scene.device[..., 7:].astype(float) - 1
+    assert channels == len(scene.brdf.names) == 10
+    assert scene.brdf.device.dtype == np.float32
+    assert scene.brdf.device.min() >= 0
+    assert scene.brdf.device.max() <= 1
+    normals = 2 * scene.brdf.device[..., 7:].astype(float) - 1
     assert np.linalg.norm(normals, axis=2) == pytest.approx(1, abs=1e-6)
     assert normals[..., 2].min() > 0.4
     assert np.abs(normals[..., :2].mean(axis=(0, 1))).max() < 0.02
@@ -56,9 +56,9 @@ def test_scene_holds_device_values_and_unit_normals(scene):
 
 def test_colours_run_from_the_lowest_to_the_highest_ground(scene):
     first, *_, last = read_primaries(PRIMARIES).parameters
-    luminous = scene.device[..., 1]
-    assert np.abs(scene.device[..., :7] - last).max(axis=2).min() < 0.01
-    assert np.abs(scene.device[..., :7] - first).max(axis=2).min() < 0.01
+    luminous = scene.brdf.device[..., 1]
+    assert np.abs(scene.brdf.device[..., :7] - last).max(axis=2).min() < 0.01
+    assert np.abs(scene.brdf.device[..., :7] - first).max(axis=2).min() < 0.01
     assert luminous.max() == pytest.approx(last[1], abs=0.01)
 
 
@@ -82,7 +82,7 @@ def test_relief_does_not_invert(lit, side, opposite):
 @pytest.mark.parametrize("side", AZIMUTHS)
 def test_highlights_face_the_light(scene, lit, side):
     brightest = lit[side] >= np.quantile(lit[side], 0.99)
-    mean_normal = (2 * scene.device[brightest][:, 7:] - 1).mean(axis=0)
+    mean_normal = (2 * scene.brdf.device[brightest][:, 7:] - 1).mean(axis=0)
     assert mean_normal @ direction(90, AZIMUTHS[side]) > 0.15
 
 
@@ -93,7 +93,8 @@ def test_command(run, tmp_path, monkeypatch):
     assert (result.code, result.err) == (0, "")
     made = result.json
     assert made["schema"] == "iccbrdf.demo/1"
-    files = [*made["profiles"], made["image"], *(f for p in made["proofs"].values() for f in p["files"])]
+    files = [*made["profiles"], *made["images"].values(), made["slopes_proof"]]
+    files += [f for p in made["proofs"].values() for f in p["files"]]
     assert sorted(os.path.basename(f) for f in files) == sorted(os.listdir(target))
     assert (target / "mvis.icc").read_bytes() == PRIMARIES.with_name("mvis.icc").read_bytes()
     pictures = {name: imagecodecs.imread(target / f"proof_{name}.png") for name in SCENES}

@@ -9,14 +9,22 @@ import argparse
 from pathlib import Path
 
 from iccbrdf.brdf.primaries import read_primaries
-from iccbrdf.build import build_pair
+from iccbrdf.brdf.slopes import read_slopes
+from iccbrdf.build import build_colour_mid, build_pair
 
 ROOT = Path(__file__).resolve().parent.parent
 
 
 def files(primaries: Path) -> dict[str, bytes]:
-    """What stands beside a primaries file: its profiles and their listing, by name."""
-    return build_pair(read_primaries(primaries)).files
+    """What stands beside a primaries file: its profiles and their listings, by name.
+
+    The colour MID is made where there is a slopes file to go with it.
+    """
+    source = read_primaries(primaries)
+    slopes = primaries.with_name("slopes.json")
+    if not slopes.exists():
+        return build_pair(source).files
+    return build_pair(source).files | build_colour_mid(source, slopes=read_slopes(slopes)).files
 
 
 def main() -> None:

@@ -16,7 +16,8 @@ Range = tuple[float, float]
 
 NORMAL = ("n.x", "n.y", "n.z")
 _NORMAL_RANGE = (-1.0, 1.0)
-_XYZ_RANGE = (0.0, 65535 / 32768)  # u1.15: the largest 16-bit integer is almost 2
+XYZ_RANGE = (0.0, 65535 / 32768)
+"""u1.15: the largest 16-bit integer is almost 2."""
 
 
 def text_tags(description: str, channels: Iterable[str]) -> dict[str, Any]:
@@ -30,7 +31,7 @@ def text_tags(description: str, channels: Iterable[str]) -> dict[str, Any]:
 
 def ranges(channels: Sequence[str], encoding: Mapping[str, float]) -> list[Range]:
     """The range of each channel: `encoding` goes by family (`kd` of `kd.X`), normals -1..1, XYZ as u1.15."""
-    known = {**dict.fromkeys(NORMAL, _NORMAL_RANGE), **dict.fromkeys("XYZ", _XYZ_RANGE)}
+    known = {**dict.fromkeys(NORMAL, _NORMAL_RANGE), **dict.fromkeys("XYZ", XYZ_RANGE)}
     return [known.get(name, (0.0, encoding.get(name.partition(".")[0], 1.0))) for name in channels]
 
 

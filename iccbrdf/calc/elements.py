@@ -32,7 +32,8 @@ def apply(
     channels: `element.inputs` 1-D arrays of pixels, or numbers that hold for all pixels.  env: run-time
     variables for calculators.  Computes in `dtype`; returns `element.outputs` arrays or scalars of it.
 
-    matf: M x + o, where a channel with coefficient 0 does not enter.  clut, xclt: multilinear, inputs clipped to 0..1, NaN as 0.  tint: linear, as clut.
+    matf: M x + o, where a channel with coefficient 0 does not enter.  clut, xclt: multilinear, inputs
+    clipped to 0..1, NaN as 0.  tint: linear, as clut.
     cvst: a break point belongs to the segment on its left; NaN stays NaN.  calc: see interpreter.run.
     Raises UnsupportedError for any other element.
     """

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import click
 
+from iccbrdf.build import last_slope
 from iccbrdf.cli.options import emit, environment, force_option, json_option, name_list, scene_options
 from iccbrdf.cli.pipeline import Output, arranged_channels, check_outputs, run
 from iccbrdf.cmm import INTENTS, link
@@ -18,6 +19,9 @@ EPILOG = """
 Examples:
   A softproof lit from the right, and its XYZ:
     iccbrdf apply relief.tif -p mid.icc -p mvis.icc -o proof.png -o xyz.tif --light 60,0
+  From the XYZ of the flat print and normals, and the BRDF image on the way:
+    iccbrdf apply xyzn.tif -p colour-mid.icc -p mvis.icc -o proof.png
+    iccbrdf apply xyzn.tif -p colour-mid.icc -p brdf-link.icc -o brdf.tif --dtype uint16
   Channels by name, for a TIFF from elsewhere:
     iccbrdf apply maps.tif -p mid.icc -p mvis.icc -o xyz.tif \\
       --channels kd.X,kd.Y,kd.Z,ks.X,ks.Y,ks.Z,m
@@ -71,8 +75,8 @@ def command(
 ) -> None:
     """Map IMAGE, a TIFF, through a chain of profiles.
 
-    The image holds the channels of the first profile: for a MID that `iccbrdf build` made these are the
-    BRDF parameters and the normal, each encoded in 0..1, or their real values.
+    The image holds the channels of the first profile, each encoded in 0..1, or their real values: for a MID
+    of `iccbrdf build` the BRDF parameters and the normal, for a colour MID XYZ and the normal.
     """
     chain = [read_profile(path) for path in profiles]
     last = chain[-1]
@@ -93,7 +97,15 @@ def command(
         names = arranged_channels(source, transform.channels_in, declared)
         if names is not None:
             transform = link(chain, channels=names, **settings)
-        done = run(source, transform, last, targets, overwrite=force, label=image.name)
+        done = run(
+            source,
+            transform,
+            last,
+            targets,
+            overwrite=force,
+            label=image.name,
+            last_slope=last_slope(chain[0]),
+        )
         size = f"{source.width} x {source.height} pixels"
         result = {
             "image": str(image),
@@ -108,11 +120,18 @@ def command(
             "backend": transform.backend,
             "not_finite_in": done.not_finite_in,
             "not_finite_out": done.not_finite_out,
+            "beyond_slopes": done.beyond_slopes,
             "outputs": done.outputs,
         }
     for count, what in ((done.not_finite_in, "image"), (done.not_finite_out, "result")):
         if count:
             click.echo(f"iccbrdf: warning: {count} samples of the {what} are not finite numbers", err=True)
+    if done.beyond_slopes:
+        click.echo(
+            f"iccbrdf: warning: {done.beyond_slopes} pixels are steeper than the last measured slope of "
+            f"{last_slope(chain[0]):g} degrees, which holds for them",
+            err=True,
+        )
     text = [f"{image}: {size}, {len(transform.channels_in)} channels ({source.samples} samples)"]
     for output in done.outputs:
         counts = [f"{n} {name.replace('_', ' ')}" for name, n in output.items() if name != "path" and n]

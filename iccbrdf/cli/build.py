@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
-from iccbrdf.brdf.primaries import read_primaries
-from iccbrdf.build import Pair, build_pair
+from iccbrdf.brdf.primaries import MIN_NODES, read_primaries
+from iccbrdf.brdf.slopes import read_slopes
+from iccbrdf.build import INTERPOLATIONS, SLOPE_METHODS, build_colour_mid, build_pair
 from iccbrdf.cli.options import emit, environment, force_option, json_option, name_list, scene_options
 from iccbrdf.errors import UsageError
 from iccbrdf.files import make_folder, write_together
@@ -16,6 +17,8 @@ EPILOG = """
 \b
 Examples:
   iccbrdf build profiles/fogra39_gloss/primaries.json -o out
+  The colour MID, from XYZ and normals, with slope adjustment:
+  iccbrdf build primaries.json -o out --slopes slopes.json
   Without the Fresnel term, and with other defaults for light and view:
   iccbrdf build primaries.json -o out --without fresnel --light 60,90 --view 10,270
 """
@@ -24,7 +27,13 @@ Examples:
 @click.command("build", epilog=EPILOG)
 @click.argument("primaries", type=click.Path(path_type=Path))
 @click.option("-o", "--output", "folder", required=True, type=click.Path(path_type=Path, file_okay=False),
-              help="Folder for mid.icc, mvis.icc and mvis.txt, the listing; made if need be.")  # fmt: skip
+              help="Folder for the profiles and their listings; made if need be.")  # fmt: skip
+@click.option("--slopes", type=click.Path(path_type=Path),
+              help="A slopes file: the colour MID adjusts XYZ to the slope.")  # fmt: skip
+@click.option("--slope-method", type=click.Choice(SLOPE_METHODS),
+              help="affine (default): continuous, exact for white and black; or as published.")  # fmt: skip
+@click.option("--interpolation", type=click.Choice(INTERPOLATIONS),
+              help="Of the colour MID.  smooth (default): continuous in XYZ; or as published.")  # fmt: skip
 @click.option("--effects", metavar="NAMES", help="Simulate these effects only, separated by commas.")
 @click.option("--without", metavar="NAMES", help="Simulate all effects but these, separated by commas.")
 @click.option("--fresnel-angle", type=click.Choice(("theta_i", "alpha")),
@@ -36,6 +45,9 @@ Examples:
 def command(
     primaries: Path,
     folder: Path,
+    slopes: Path | None,
+    slope_method: str | None,
+    interpolation: str | None,
     effects: str | None,
     without: str | None,
     fresnel_angle: str | None,
@@ -45,8 +57,16 @@ def command(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Make a MID and the MVIS it goes with from PRIMARIES, a primaries file.
+    """Make profiles from PRIMARIES, a primaries file.
 
+    \b
+    mid.icc         the binding MID: a BRDF image, each parameter in 0..1
+    mvis.icc        the MVIS: the model, light and view
+    colour-mid.icc  the colour MID: XYZ of the flat print and normals
+    brdf-link.icc   after the colour MID: the BRDF image for the binding MID
+    *.txt           listings of their programs
+
+    The colour MID interpolates between the primaries and needs four of them; without, it is left out.
     --light, --view and --env set the defaults that the profiles hold; whoever runs them may set others.
     """
     if effects is not None and without is not None:
@@ -59,7 +79,22 @@ def command(
         fresnel_angle=fresnel_angle,
         variables=environment(light, view, env),
     )
-    files = write_pair(pair, folder, overwrite=force)
+    built = pair.files
+    wanted = interpolation is not None or slopes is not None
+    if slope_method is not None and slopes is None:
+        raise UsageError("--slope-method needs --slopes, the measurements that it works with")
+    colour = None
+    if wanted or len(source.primaries) >= MIN_NODES:
+        colour = build_colour_mid(
+            source,
+            interpolation=interpolation or "smooth",
+            slopes=read_slopes(slopes) if slopes is not None else None,
+            slope_method=slope_method or "affine",
+        )
+        built |= colour.files
+    make_folder(folder)
+    files = {folder / name: data for name, data in built.items()}
+    write_together(files, overwrite=force)
     compiled = pair.compiled
     simulated = [name for name, on in compiled.effects.items() if on]
     result = {
@@ -70,19 +105,15 @@ def command(
         "variables": dict(compiled.variables),
         "operators": len(compiled.program),
         "executed": compiled.executed,
+        "colour_mid_executed": colour.compiled.executed if colour else None,
         "files": [str(file) for file in files],
     }
     text = [
         f"{source.model}: {len(compiled.program)} operators, at most {compiled.executed} run for a pixel",
         f"  effects: {', '.join(simulated) or 'none'}",
+        f"colour MID: at most {colour.compiled.executed} operators run for a pixel"
+        if colour
+        else f"no colour MID: {len(source.primaries)} primaries, {MIN_NODES} are needed",
         *(f"  -> {file}" for file in files),
     ]
     emit(as_json, "iccbrdf.build/1", result, "\n".join(text))
-
-
-def write_pair(pair: Pair, folder: Path, *, overwrite: bool) -> list[Path]:
-    """Write mid.icc, mvis.icc and their listing, all of them or none; returns their paths."""
-    make_folder(folder)
-    files = {folder / name: data for name, data in pair.files.items()}
-    write_together(files, overwrite=overwrite)
-    return list(files)

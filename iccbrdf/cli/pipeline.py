@@ -12,6 +12,8 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from iccbrdf.brdf.slopes import slope_angle
+from iccbrdf.build.profiles import NORMAL
 from iccbrdf.cmm import Transform, standard_XYZ
 from iccbrdf.errors import UsageError, nearest
 from iccbrdf.files import check_target
@@ -53,6 +55,8 @@ class Done:
     """Samples of the image that are not finite numbers."""
     not_finite_out: int = 0
     """The same of the result."""
+    beyond_slopes: int = 0
+    """Pixels steeper than the last measured slope, which holds for them."""
 
 
 def check_outputs(outputs: Sequence[Output], *, overwrite: bool) -> None:
@@ -78,8 +82,12 @@ def run(
     *,
     overwrite: bool,
     label: str,
+    last_slope: float | None = None,
 ) -> Done:
-    """Stream `source` through `transform`, whose chain ends on profile `last`, into `outputs`."""
+    """Stream `source` through `transform`, whose chain ends on profile `last`, into `outputs`.
+
+    `last_slope`: the steepest slope in degrees that the chain has measurements for, if it adjusts to slopes.
+    """
     to_display = None
     if any(output.is_png for output in outputs):
         if transform.channels_out not in _COLORIMETRIC:
@@ -90,13 +98,13 @@ def run(
         to_display = standard_XYZ(last)
     done = Done()
     with ExitStack() as stack:
-        sinks = [
-            stack.enter_context(_open(output, source, transform, overwrite)) for output in outputs
-        ]
+        sinks = [stack.enter_context(_open(output, source, transform, overwrite)) for output in outputs]
         for block in _progress(source, label):
             result = transform(block.data)
             done.not_finite_in += _not_finite(block.data)
             done.not_finite_out += _not_finite(result)
+            if last_slope is not None:
+                done.beyond_slopes += _steeper(block.data, source.samples, transform.channels_in, last_slope)
             display = to_display(result) if to_display else result
             for output, sink in zip(outputs, sinks, strict=True):
                 sink.write(block._replace(data=display if output.is_png else result))
@@ -108,6 +116,16 @@ def run(
 
 def _not_finite(data: npt.NDArray[Any]) -> int:
     return data.size - int(np.count_nonzero(np.isfinite(data)))
+
+
+def _steeper(data: npt.NDArray[Any], samples: str, names: Sequence[str], limit: float) -> int:
+    """The number of pixels whose normal leans by more than `limit` degrees."""
+    if not set(NORMAL) <= set(names):
+        return 0
+    normals = data[..., [names.index(name) for name in NORMAL]]
+    angles = slope_angle(2 * normals - 1 if samples == "device" else normals)
+    # float32 normals of just that slope are not steeper.
+    return int(np.count_nonzero(angles > limit + 1e-3))
 
 
 def _open(output: Output, source: TiffSource, transform: Transform, overwrite: bool) -> Any:

@@ -1,0 +1,198 @@
+"""Primaries and slopes -> the colour MID: from XYZ and normals straight to BRDF parameters.
+
+Its device channels are the XYZ of the flat print, as the ICC's u1.15, and the normal; its calculator
+adjusts XYZ to the slope and interpolates the parameters between the primaries.  A multiplex link takes the
+parameters on to the device channels of the binding MID, so that the BRDF image itself can be written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from iccbrdf.brdf.primaries import Primaries, check_nodes
+from iccbrdf.brdf.slopes import Slopes, published_jumps
+from iccbrdf.brdf.smooth_interpolation import SmoothMap
+from iccbrdf.build.models import MODELS
+from iccbrdf.build.profiles import decoding, encoding, ranges, text_tags
+from iccbrdf.calc import Compiled, compile_chain
+from iccbrdf.calc import listing as program_listing
+from iccbrdf.errors import InputError, UsageError, nearest
+from iccbrdf.icc import Calculator, ColorantTable, Header, MultiProcess, NumberArray, Profile
+from iccbrdf.resources import folder
+
+INTERPOLATIONS = ("smooth", "published")
+SLOPE_METHODS = ("affine", "published")
+
+SLOPES_TAG = "slop"
+"""Private tag (fl32) of a colour MID: the measured slopes in degrees.  Beyond the last one, it is held."""
+
+
+@dataclass(frozen=True)
+class ColourMid:
+    """A colour MID, the link from its multiplex channels to a binding MID's device, and a listing."""
+
+    mid: Profile
+    link: Profile
+    listing: str
+    compiled: Compiled
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """What is written to a folder, by file name."""
+        return {
+            "colour-mid.icc": self.mid.to_bytes(),
+            "brdf-link.icc": self.link.to_bytes(),
+            "colour-mid.txt": self.listing.encode(),
+        }
+
+
+def build_colour_mid(
+    primaries: Primaries,
+    *,
+    interpolation: str = "smooth",
+    slopes: Slopes | None = None,
+    slope_method: str = "affine",
+    p: float = 2.0,
+    exponent: float = -1.0,
+) -> ColourMid:
+    """Build the colour MID of a set of primaries.
+
+    Parameters
+    ----------
+    primaries
+        4 to 16 nodes with their XYZ and parameters.
+    interpolation
+        `smooth`, continuous in XYZ, or `published`, with its choice of the number of nodes.
+    slopes
+        White and black printed on slopes; None: no slope adjustment.
+    slope_method
+        `affine` or `published`.
+    p, exponent
+        Norm of the chromaticity distance and exponent of the weights, for `published`.
+
+    Raises
+    ------
+    InputError
+        Nodes too few, too many or too close; slopes measured under other conditions than the primaries.
+    UsageError
+        A method is unknown.
+    """
+    for value, valid, what in (
+        (interpolation, INTERPOLATIONS, "interpolation"),
+        (slope_method, SLOPE_METHODS, "slope method"),
+    ):
+        if value not in valid:
+            raise UsageError(f"{what} {value!r} is unknown: {nearest(value, valid)}")
+    check_nodes(primaries)
+    if slopes is not None:
+        _check_conditions(primaries, slopes)
+    names = [f"interpolate_{interpolation}.calc"]
+    constants = _nodes(primaries, interpolation, p, exponent)
+    if slopes is not None:
+        names.insert(0, "slope_adjust.calc")
+        constants |= {
+            "slope_angles": slopes.angles,
+            "slope_W": slopes.W,
+            "slope_B": slopes.B,
+            "slope_method": slope_method,
+        }
+    templates = folder("calc_templates")
+    texts = [((templates / name).read_text(encoding="utf-8"), name) for name in names]
+    compiled = compile_chain(texts, constants=constants)
+    adjustment = f"{slope_method} slope adjustment" if slopes is not None else "no slope adjustment"
+    title = f"{MODELS[primaries.model].title}, {interpolation} interpolation, {adjustment}"
+    return ColourMid(
+        mid=_mid(compiled, title, slopes),
+        link=_link(compiled.outputs, primaries, MODELS[primaries.model].title),
+        listing="\n".join(_lines(compiled, title, slopes)) + "\n",
+        compiled=compiled,
+    )
+
+
+def last_slope(profile: Profile) -> float | None:
+    """The steepest slope in degrees that a colour MID has measurements for; None where it adjusts to none."""
+    slopes = profile.get(SLOPES_TAG)
+    return float(slopes.values[-1]) if isinstance(slopes, NumberArray) and len(slopes.values) else None
+
+
+def _check_conditions(primaries: Primaries, slopes: Slopes) -> None:
+    for what in ("illuminant", "observer"):
+        found, expected = getattr(slopes, what), getattr(primaries, what)
+        if found != expected:
+            raise InputError(f"slopes: {what}: found {found!r}, expected that of the primaries, {expected!r}")
+
+
+def _nodes(primaries: Primaries, interpolation: str, p: float, exponent: float) -> dict[str, Any]:
+    """The constants of the interpolation templates."""
+    constants: dict[str, Any] = {"brdf": primaries.model, "white": primaries.white}
+    if interpolation == "smooth":
+        solved = SmoothMap.of(primaries)
+        return constants | {
+            "coded_nodes": solved.nodes,
+            "coefficients": solved.coefficients,
+            "constant_terms": solved.constant,
+        }
+    return constants | {
+        "node_XYZ": primaries.XYZ,
+        "node_kd": primaries.parameters[:, :3],
+        "node_gloss": primaries.parameters[:, 3:],
+        "p": p,
+        "exponent": exponent,
+    }
+
+
+def _mid(compiled: Compiled, title: str, slopes: Slopes | None) -> Profile:
+    """Device -> real by a matrix, real -> parameters by the program."""
+    n_in, n_out = len(compiled.inputs), len(compiled.outputs)
+    decode = decoding(ranges(compiled.inputs, {}))
+    program = Calculator(inputs=n_in, outputs=n_out, program=compiled.program)
+    header = Header(device_class="mid ", colour_space=f"nc{n_in:04x}", mcs=f"mc{n_out:04x}")
+    tags = {
+        **text_tags(f"Colour MID for {title}", compiled.outputs),
+        "clrt": ColorantTable.of(compiled.inputs),
+        "A2M0": MultiProcess(n_in, n_out, (decode, program)),
+    }
+    if slopes is not None:
+        tags[SLOPES_TAG] = NumberArray("fl32", slopes.angles)
+    return Profile(header, tags)
+
+
+def _link(channels: tuple[str, ...], primaries: Primaries, title: str) -> Profile:
+    """Multiplex channels -> the device channels of the binding MID."""
+    n = len(channels)
+    encode = encoding(ranges(channels, primaries.encoding))
+    header = Header(device_class="mlnk", colour_space=f"nc{n:04x}", mcs=f"mc{n:04x}")
+    return Profile(
+        header,
+        {
+            **text_tags(f"BRDF image of {title}", channels),
+            "clrt": ColorantTable.of(channels),
+            "M2A0": MultiProcess(n, n, (encode,)),
+        },
+    )
+
+
+def _lines(compiled: Compiled, title: str, slopes: Slopes | None) -> Iterator[str]:
+    yield title
+    yield ""
+    yield "Colour MID (tag A2M0): each device channel in 0..1 becomes the real value"
+    for channel, (low, high) in zip(compiled.inputs, ranges(compiled.inputs, {}), strict=True):
+        yield f"  {channel:<4} = {low:g} + {high - low:.9g} * device"
+    yield f"and the program's outputs are the multiplex channels {' '.join(compiled.outputs)}"
+    if slopes is not None:
+        yield ""
+        yield "Slopes: by how much the published equations jump where the colour becomes white or black"
+        jumps = published_jumps(slopes, slopes.angles)
+        for angle, white, black in zip(slopes.angles, jumps.white_dE, jumps.black_dE, strict=True):
+            yield f"  {angle:>4g} degrees: CIEDE2000 {white:.3f} at white, {black:.3f} at black"
+    yield ""
+    yield (
+        f"Program: {len(compiled.program)} operators, of which at most {compiled.executed} are executed "
+        "for a pixel"
+    )
+    yield ""
+    yield from compiled.documentation.splitlines()
+    yield ""
+    yield program_listing(compiled.program)
