@@ -45,6 +45,13 @@ def written(body):
         ("input a\nlet b = sin(a)\noutput X Y = (b, exp(a) * b)",
          "in(0) sin tsav(0) in(0) exp tget(0) mul out(0,2)"),
         ("input a\nlet b = sin(a)\noutput X Y Z = (b, b, b)", "in(0) sin copy(1,2) out(0,3)"),
+        # So are three constants or more, and a value that is used several times in a row is copied.
+        ("input a\nlet c = (1, 2, 3)\noutput X Y Z = exp(c * a) - c",
+         "1 2 3 tsav(0,3) in(0) smul(3) exp(3) tget(0,3) sub(3) out(0,3)"),
+        ("input a\nlet c = (1, 2)\noutput X Y = exp(c * a) - c",
+         "1 2 in(0) smul(2) exp(2) 1 2 sub(2) out(0,2)"),
+        ("input a\nlet b = sin(a)\nlet c = exp(a)\noutput X Y Z V W = (b, c, b, b, b)",
+         "in(0) sin tsav(0) in(0) exp tget(0) copy(1,2) out(0,5)"),
         # Values that are read one after the other are neighbours, though they were computed apart.
         ("input a\nlet s = sin(a)\nlet t = cos(a) + s\noutput X Y Z = (t, exp(a), s * t)",
          "in(0) cos in(0) sin tsav(0) add tsav(1) in(0) exp tget(0,2) mul out(0,3)"),

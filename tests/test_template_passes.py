@@ -138,6 +138,7 @@ def repeated(graph, number):
         (lambda g: g.add("pow", [x(g), repeated(g, 2)]), "%1[3] = sq(%0)"),
         (lambda g: g.add("neg", [g.add("neg", [x(g)])]), "%0[3] = input(0)"),
         (lambda g: g.add("sq", [g.add("neg", [x(g)])]), "%1[3] = sq(%0)"),
+        (lambda g: g.add("sq", [g.add("abs", [x(g)])]), "%1[3] = sq(%0)"),
         (lambda g: g.add("abs", [g.add("neg", [x(g)])]), "%1[3] = abs(%0)"),
         (lambda g: g.add("add", [g.input(5, 3), g.add("neg", [x(g)])]), "%2[3] = sub(%0, %1)"),
         (lambda g: g.add("sub", [g.input(5, 3), g.add("neg", [x(g)])]), "%2[3] = add(%0, %1)"),

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from iccbrdf.calc.compiler import compile_template
+from iccbrdf.calc.compiler import compile_chain, compile_template
 from iccbrdf.calc.interpreter import run
 from iccbrdf.calc.source import Effect, Input, Output, When, parse
 from iccbrdf.errors import InputError
@@ -233,3 +233,134 @@ def test_deep_nesting_is_refused_and_long_chains_are_not():
     assert "nested too deeply" in message("output X = " + "-" * 5000 + "1")
     chain = "input a\n" + "".join(f"let x{k} = sin({f'x{k - 1}' if k else 'a'}) + 1\n" for k in range(1200))
     assert compiled(chain + "output X = x1199").executed == 3602
+
+
+TABLES = "constant nodes[n, 3]\nconstant gloss[n, k]\nconstant angles[s]\n"
+GIVEN = {
+    "nodes": [[1, 2, 3], [4, 5, 6], [7, 8, 9], [10, 11, 12]],
+    "gloss": np.array([[1, 2], [3, 4], [5, 6], [7, 8]]),
+    "angles": (0, 15, 30),
+}
+
+
+def numbers(expression, width=1, **tables):
+    """The value in float64 of an expression of the tables."""
+    names = " ".join(f"out{k}" for k in range(width))
+    body = f"{TABLES}output {names} = {expression}\n"
+    program = compiled(body, constants={**GIVEN, **tables}).program
+    return [float(v) for v in run(program, [], width, dtype=np.float64)]
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        ("(n, s, k)", [4, 3, 2]),
+        ("nodes.Y", [2, 5, 8, 11]),
+        ("nodes[n - 1]", [10, 11, 12]),
+        ("nodes[1].z + nodes.X[2]", [13]),
+        ("angles", [0, 15, 30]),
+        ("angles[1:s] - angles[0:s - 1]", [15, 15]),
+        ("gloss[0]", [1, 2]),
+        ("(1, 0, 2, 0) @ nodes", [15, 18, 21]),
+        ("2 * (1, 0, 2, 0) @ gloss / 2", [11, 14]),
+        ("total i = 1 to n { i * i }", [30]),
+        ("1 + total i = 0 to 1 {\n let a = angles[i:i + 2]\n a / 15\n}", [2, 4]),
+        ("total i = 2 to 2 { angles }", [0, 15, 30]),
+    ],
+)
+def test_tables_have_columns_rows_and_sums_of_rows(expression, expected):
+    assert numbers(expression, len(expected)) == expected
+
+
+def test_tables_are_as_long_as_what_is_given():
+    assert numbers("angles[s - 1]", angles=range(17)) == [16]
+    assert numbers("(n, nodes.Z[0])", 2, nodes=np.ones((1, 3)), gloss=[[1]]) == [1, 1]
+    result = compiled(TABLES + "output X = nodes.X[0]", constants=GIVEN)
+    assert result.constants["gloss"] == (1, 2, 3, 4, 5, 6, 7, 8)
+    assert result.constants["angles"] == (0, 15, 30)
+
+
+def test_polar_and_lab_give_one_plane_after_the_other():
+    assert value("polar((a, 1), b)", 0.0, -2.0, width=4) == pytest.approx([2, 5**0.5, 270, 296.565051177])
+    assert value("lab((a, 1), (1, 1), (1, b))", 1.0, 1.0, width=6) == pytest.approx(
+        [100, 100, 0, 0, 0, 0], abs=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        ("nodes", "t.calc:6:12: nodes is a table of rows; expected a column (nodes.X), a row (nodes[0])"),
+        ("angles.x @ angles", "found '@' before something else than the name of a table of rows"),
+        ("angles @ nodes", "t.calc:6:19: found 3 component(s) before '@', expected 4, one for each row"),
+        ("gloss.Z[0]", "t.calc:6:12: found column Z of a table of 2 column(s)"),
+        ("nodes[4].x", "t.calc:6:12: found row 4 of a table of 4 row(s)"),
+        ("angles[0.5]", "t.calc:6:19: the index is 0.5, expected a whole number"),
+        ("angles[angles]", "the index is 0, 15, 30, expected a whole number"),
+        ("angles[a]", "the index depends on what only a run knows; expected constants"),
+        ("angles[3]", "found component 3 of a value of 3 component(s)"),
+        ("angles[2:2]", "t.calc:6:12: found components 2 up to 2 of a value of 3 component(s)"),
+        ("angles[0:4]", "found components 0 up to 4 of a value of 3 component(s)"),
+        ("total i = 2 to 1 { i }", "t.calc:6:12: a total from 2 to 1 has nothing to add up"),
+        ("total s = 1 to 2 { s }", "t.calc:6:12: 's' has a value already"),
+        ("total i = 2 to 3 { angles[0:i] }", "'total' of vectors of 2 and 3 components"),
+    ],
+)
+def test_errors_of_tables_say_where_and_what(expression, expected):
+    assert expected in message(f"{TABLES}input a\noutput X = {expression}\n", constants=GIVEN)
+
+
+@pytest.mark.parametrize(
+    ("tables", "expected"),
+    [
+        ({"nodes": None}, "t.calc:2:1: nodes is not given; expected finite numbers of shape (n, 3)"),
+        ({"nodes": [1, 2, 3]}, "nodes is [1, 2, 3]; expected finite numbers of shape (n, 3)"),
+        ({"nodes": [[1, 2], [3]]}, "expected finite numbers of shape (n, 3)"),
+        ({"nodes": [[1, 2, np.inf]]}, "expected finite numbers of shape (n, 3)"),
+        ({"nodes": np.ones((4, 2))}, "t.calc:2:1: nodes has 2 columns, expected 3"),
+        ({"gloss": np.ones((5, 2))}, "t.calc:3:1: gloss has 5 rows, expected 4, as nodes has"),
+        ({"angles": []}, "angles is []; expected finite numbers of shape (s)"),
+        ({"angels": [1]}, "no constant 'angels' is declared; did you mean 'angles'?"),
+    ],
+)
+def test_tables_that_do_not_fit_are_refused(tables, expected):
+    given = {name: values for name, values in {**GIVEN, **tables}.items() if values is not None}
+    assert expected in message(TABLES + "output X = 1\n", constants=given)
+
+
+def chain(*bodies, **settings):
+    templates = [(f"model m{k}\n{body}\n", f"{k}.calc") for k, body in enumerate(bodies)]
+    return compile_chain(templates, **settings)
+
+
+def test_a_chain_wires_channels_by_name():
+    result = chain(
+        "input X default 5\ninput w\noutput Y X = (X + 1, X * 10)",
+        "input a[3] = w X b default 7\noutput c b = (sum(a), a.x)",
+        "input b\ninput w\ninput c\noutput r s t = (b, w, c)",
+    )
+    # b is read by the second before it writes it, w passes by all, Y goes nowhere.
+    assert result.inputs == ("X", "w", "b")
+    assert result.defaults == (5, 0, 7)
+    assert result.outputs == ("r", "s", "t")
+    assert result.model == "m0 m1 m2"
+    assert [float(v) for v in run(result.program, [2, 3, 4], 3)] == [3, 3, 27]
+    assert "add" not in {op.name for op in chain("input X\noutput Y = X + 1", "output Z = 2").program}
+
+
+def test_settings_go_to_all_templates_of_a_chain_that_know_them():
+    first = (
+        "constant white = 2\nchoice way = up | down\neffect on_first = on\nruntime lit = 1\noutput X = white"
+    )
+    second = "constant white = 3\nruntime lit = 4\ninput X\noutput Y Z = (X * white, lit)"
+    result = chain(first, second, constants={"white": 5, "way": "down"}, variables={"lit": 6})
+    assert [float(v) for v in run(result.program, [], 2)] == [25, 6]
+    assert result.variables == {"lit": 6}
+    assert result.constants == {"white": (5,), "way": "down"}
+    assert [float(v) for v in run(chain(first, second).program, [], 2)] == [6, 4]
+    with pytest.raises(InputError, match=r"0\.calc, 1\.calc: no constant 'whit' .* mean 'white'"):
+        chain(first, second, constants={"whit": 1})
+    with pytest.raises(InputError, match=r"1\.calc:2:12: nothing is named 'a'"):
+        chain("let a = 1\noutput X = a", "output X = a")
+    with pytest.raises(InputError, match="no template to compile"):
+        compile_chain([])

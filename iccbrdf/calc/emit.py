@@ -30,9 +30,11 @@ from iccbrdf.errors import LimitError
 _BY_SCALAR = {"add": "sadd", "sub": "ssub", "mul": "smul", "div": "sdiv", "pow": "gama"}
 """Operators of a vector and one scalar, by the operator whose second operand would repeat it."""
 
-_LEAVES = ("const", "input")
 _VIEWS = ("pack", "pick", "splat")
-"""What is not worth a temporary: it is pushed again, or is a part of something that has one."""
+"""What needs no temporary: it is a part of something that has one, or made of such."""
+
+_LEAST_CONSTANTS = 3
+"""Constants pushed twice are worth a temporary from this number of them, with one operator for each."""
 
 
 @dataclass(eq=False)
@@ -306,11 +308,13 @@ def _shared(graph: Graph, live: Sequence[Node]) -> set[Node]:
             pushes[argument] += each
         if node.op == "pick":
             in_parts.add(node.arguments[0])
-    return {
-        node
-        for node in live
-        if node.op not in _LEAVES + _VIEWS and (pushes[node] > 1 or node in in_parts)
-    }
+    return {node for node in live if _worth_saving(node) and (pushes[node] > 1 or node in in_parts)}
+
+
+def _worth_saving(node: Node) -> bool:
+    if node.op == "const":
+        return node.width >= _LEAST_CONSTANTS
+    return node.op not in ("input", *_VIEWS)
 
 
 _Path: TypeAlias = tuple[tuple[int, int], ...]
@@ -360,7 +364,7 @@ def _sequences(code: list[_Item]) -> Iterator[list[_Item]]:
 
 
 def _with_copies(code: list[_Item]) -> list[_Item]:
-    """The code with `copy` where a value is read back just where it was saved."""
+    """The code with `copy` where a value is read back just where it was saved, or several times in a row."""
     loads = Counter(
         item.block for sequence in _sequences(code) for item in sequence if isinstance(item, _Load)
     )
@@ -373,6 +377,13 @@ def _with_copies(code: list[_Item]) -> list[_Item]:
             position += 1
             if isinstance(item, _If):
                 result.append(_If(rewritten(item.then), rewritten(item.otherwise)))
+                continue
+            if isinstance(item, _Load):
+                result.append(item)
+                again = _run(item, sequence, position)
+                if again > 1:
+                    result.append(operator("copy", item.width, again))
+                    position += again
                 continue
             if not isinstance(item, _Store):
                 result.append(item)
@@ -390,6 +401,14 @@ def _with_copies(code: list[_Item]) -> list[_Item]:
         return result
 
     return rewritten(code)
+
+
+def _run(item: _Item, sequence: Sequence[_Item], position: int) -> int:
+    """How many items from `position` on are `item`."""
+    end = position
+    while end < len(sequence) and sequence[end] == item:
+        end += 1
+    return end - position
 
 
 def _reads(item: _Item, block: _Block) -> bool:

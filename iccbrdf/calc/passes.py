@@ -166,13 +166,15 @@ def square(graph: Graph, node: Node) -> Node | None:
 
 
 def sign(graph: Graph, node: Node) -> Node | None:
-    """x + -y is x - y, x - -y is x + y, --x is x, (-x)^2 is x^2."""
+    """x + -y is x - y, x - -y is x + y, --x is x, (-x)^2 and |x|^2 are x^2."""
     if node.op in ("add", "sub") and node.arguments[1].op == "neg":
         other = {"add": "sub", "sub": "add"}[node.op]
         return graph.add(other, [node.arguments[0], node.arguments[1].arguments[0]])
     if node.op in ("neg", "sq", "abs") and node.arguments[0].op == "neg":
         inner = node.arguments[0].arguments[0]
         return inner if node.op == "neg" else graph.add(node.op, [inner])
+    if node.op == "sq" and node.arguments[0].op == "abs":
+        return graph.add("sq", node.arguments[0].arguments)
     return None
 
 
