@@ -21,6 +21,7 @@ from iccbrdf.icc.elements import (
     UnknownElement,
 )
 from iccbrdf.icc.header import D50, MCS_SUBSET, Header, channel_count
+from iccbrdf.icc.lut import Curve, LutAToB, LutBToA, ParametricCurve
 from iccbrdf.icc.profile import (
     MissingTagError,
     Profile,
@@ -57,16 +58,20 @@ __all__ = [
     "Clut",
     "Colorant",
     "ColorantTable",
+    "Curve",
     "CurveSet",
     "ExtendedClut",
     "FormulaSegment",
     "Header",
     "LocalisedText",
+    "LutAToB",
+    "LutBToA",
     "Matrix",
     "MissingTagError",
     "Mluc",
     "MultiProcess",
     "NumberArray",
+    "ParametricCurve",
     "PlainText",
     "Profile",
     "SampledCalculatorCurve",
