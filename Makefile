@@ -29,6 +29,7 @@ profiles: $(VENV)/installed
 
 figures: demo
 	$(BIN)/python tools/make_figures.py
+	$(BIN)/python tools/report_colour_mid.py
 
 clean:
 	rm -rf $(VENV) demo build *.egg-info .mypy_cache .ruff_cache .pytest_cache
