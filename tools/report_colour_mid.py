@@ -97,9 +97,8 @@ def main() -> None:
         print(f"{method}: {compiled.executed} operators with slope adjustment")
         for angle in SLOPES.angles:
             dE = closure(method, angle, XYZ)
-            print(
-                f"  closure at {angle:>2g} degrees: {dE.mean():.2f} / {np.quantile(dE, 0.95):.2f} / {dE.max():.2f}"
-            )
+            figures = (dE.mean(), np.quantile(dE, 0.95), dE.max())
+            print(f"  closure at {angle:>2g} degrees: " + " / ".join(f"{figure:.2f}" for figure in figures))
     draw_continuity(arguments.output / "continuity.png", arguments.lines, rng)
 
 
