@@ -32,8 +32,7 @@ def apply(
     channels: `element.inputs` 1-D arrays of pixels, or numbers that hold for all pixels.  env: run-time
     variables for calculators.  Computes in `dtype`; returns `element.outputs` arrays or scalars of it.
 
-    matf: M x + o, where a channel with coefficient 0 does not enter.  clut, xclt: multilinear, inputs
-    clipped to 0..1, NaN as 0.  tint: linear, as clut.
+    matf: M x + o.  clut, xclt: multilinear, inputs clipped to 0..1, NaN as 0.  tint: linear, as clut.
     cvst: a break point belongs to the segment on its left; NaN stays NaN.  calc: see interpreter.run.
     Raises UnsupportedError for any other element.
     """
@@ -53,11 +52,9 @@ def _matrix(element: Any, channels: Sequence[Value], env: Environment) -> list[V
     if element.matrix is None:
         return list(offset)
     rows = element.matrix.astype(dtype)
-    # A coefficient of 0 leaves its channel out, which is quicker and keeps a NaN where it came from.
-    used = [[(c, x) for c, x in zip(row, channels, strict=True) if c != 0] for row in rows]
     return [
-        reduce(np.add, (c * x for c, x in terms)) + constant if terms else constant
-        for terms, constant in zip(used, offset, strict=True)
+        reduce(np.add, map(np.multiply, row, channels)) + constant
+        for row, constant in zip(rows, offset, strict=True)
     ]
 
 
