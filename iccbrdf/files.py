@@ -60,12 +60,9 @@ def atomic_output(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
     """
     target = check_target(path, overwrite=overwrite)
     temporary = target.with_name(f".{secrets.token_hex(8)}.part")
+    # From the file's first moment on inside `try`, so that an interrupt cannot leave it behind.
     try:
-        # Mode "x" applies the user's umask, which tempfile.mkstemp would not.
-        temporary.open("xb").close()
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be written: {error.strerror}") from error
-    try:
+        _make_empty(temporary, path)
         yield temporary
         check_target(path, overwrite=overwrite)
         temporary.replace(target)
@@ -75,6 +72,14 @@ def atomic_output(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _make_empty(temporary: Path, path: StrPath) -> None:
+    try:
+        # Mode "x" applies the user's umask, which tempfile.mkstemp would not.
+        temporary.open("xb").close()
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def write_together(files: Mapping[Path, bytes], *, overwrite: bool = False) -> None:
