@@ -20,7 +20,7 @@ from iccbrdf.brdf.slopes import read_slopes, slope_adjust, slope_angle
 from iccbrdf.brdf.smooth_interpolation import SmoothMap
 from iccbrdf.build import build_colour_mid, build_pair
 from iccbrdf.build.profiles import XYZ_RANGE
-from iccbrdf.errors import InputError
+from iccbrdf.errors import InputError, UsageError
 
 FOLDER = ROOT / "profiles" / "fogra39_gloss"
 PRIMARIES = read_primaries(FOLDER / "primaries.json")
@@ -293,3 +293,15 @@ def test_operators():
 def test_nodes_that_cannot_be_interpolated(change, message):
     with pytest.raises(InputError, match=message):
         build_colour_mid(replace(PRIMARIES, primaries=change(PRIMARIES.primaries)))
+
+
+def test_the_flat_print_alone_is_no_slope():
+    flat = replace(SLOPES, slopes=SLOPES.slopes[:1])
+    with pytest.raises(InputError, match="at least one slope"):
+        build_colour_mid(PRIMARIES, slopes=flat)
+
+
+@pytest.mark.parametrize("wrong", [{"p": 0.5}, {"p": np.inf}, {"exponent": 0}, {"interpolation": "smoth"}])
+def test_settings_that_do_not_exist(wrong):
+    with pytest.raises(UsageError):
+        build_colour_mid(PRIMARIES, **wrong)

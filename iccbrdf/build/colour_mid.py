@@ -77,7 +77,7 @@ def build_colour_mid(
     InputError
         Nodes too few, too many or too close; slopes measured under other conditions than the primaries.
     UsageError
-        A method is unknown.
+        A method is unknown, or `p` or `exponent` is out of range.
     """
     for value, valid, what in (
         (interpolation, INTERPOLATIONS, "interpolation"),
@@ -85,9 +85,11 @@ def build_colour_mid(
     ):
         if value not in valid:
             raise UsageError(f"{what} {value!r} is unknown: {nearest(value, valid)}")
+    if not (1 <= p <= 8 and 0 < abs(exponent) <= 4):
+        raise UsageError(f"p {p:g}, exponent {exponent:g}: expected p in 1..8, exponent in -4..4 and not 0")
     check_nodes(primaries)
     if slopes is not None:
-        _check_conditions(primaries, slopes)
+        _check_slopes(primaries, slopes)
     names = [f"interpolate_{interpolation}.calc"]
     constants = _nodes(primaries, interpolation, p, exponent)
     if slopes is not None:
@@ -117,7 +119,9 @@ def last_slope(profile: Profile) -> float | None:
     return float(slopes.values[-1]) if isinstance(slopes, NumberArray) and len(slopes.values) else None
 
 
-def _check_conditions(primaries: Primaries, slopes: Slopes) -> None:
+def _check_slopes(primaries: Primaries, slopes: Slopes) -> None:
+    if len(slopes.slopes) < 2:
+        raise InputError("slopes: found the flat print alone, expected at least one slope beside it")
     for what in ("illuminant", "observer"):
         found, expected = getattr(slopes, what), getattr(primaries, what)
         if found != expected:

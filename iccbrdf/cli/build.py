@@ -34,6 +34,11 @@ Examples:
               help="affine (default): continuous, exact for white and black; or as published.")  # fmt: skip
 @click.option("--interpolation", type=click.Choice(INTERPOLATIONS),
               help="Of the colour MID.  smooth (default): continuous in XYZ; or as published.")  # fmt: skip
+@click.option("--p", type=click.FloatRange(1, 8), default=2.0, show_default=True,
+              help="Published interpolation: norm of the distance of chromaticities.")  # fmt: skip
+@click.option("--exponent", type=click.FloatRange(-4, 4), default=-1.0, show_default=True,
+              help="Published interpolation: exponent of the distance as weight.  -1 (2020) gives near nodes "
+              "more weight, 1 (printed in 2023) far ones.")  # fmt: skip
 @click.option("--effects", metavar="NAMES", help="Simulate these effects only, separated by commas.")
 @click.option("--without", metavar="NAMES", help="Simulate all effects but these, separated by commas.")
 @click.option("--fresnel-angle", type=click.Choice(("theta_i", "alpha")),
@@ -48,6 +53,8 @@ def command(
     slopes: Path | None,
     slope_method: str | None,
     interpolation: str | None,
+    p: float,
+    exponent: float,
     effects: str | None,
     without: str | None,
     fresnel_angle: str | None,
@@ -90,6 +97,8 @@ def command(
             interpolation=interpolation or "smooth",
             slopes=read_slopes(slopes) if slopes is not None else None,
             slope_method=slope_method or "affine",
+            p=p,
+            exponent=exponent,
         )
         built |= colour.files
     make_folder(folder)
