@@ -19,8 +19,8 @@ STEPS = 65536
 class Power:
     """y = (a x + b)^g + c, for x in 0..1.
 
-    The parameters are whole multiples of 1 / `STEPS`, of which float32 holds those below 256 too: the curve
-    is the same one in every profile, and where a table's nodes lie is known exactly.
+    The parameters are whole multiples of 1 / `STEPS`, which float32 holds as well (below 256): the curve is
+    the same one in every profile, and where a table's nodes lie is known exactly.
     """
 
     g: float
@@ -78,6 +78,7 @@ GLOSS_POWER = 16
 def near_exponential(least: float, largest: float) -> Power:
     """From a `GLOSS_POWER`th root of y, stretched to 0..1, back to y in `least`..`largest`."""
     b = _down(least ** (1 / GLOSS_POWER))
+    # A step more, for a channel that is the same everywhere must not make a 0.
     return Power(GLOSS_POWER, _up(largest ** (1 / GLOSS_POWER) - b) + 1 / STEPS, b, 0)
 
 
