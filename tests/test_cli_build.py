@@ -178,3 +178,23 @@ def test_slopes_under_another_light_are_refused(run, tmp_path):
     result = run("build", PRIMARIES, "-o", tmp_path / "out", "--slopes", tmp_path / "slopes.json")
     assert (result.code, result.out) == (3, "")
     assert "illuminant: found 'D65', expected that of the primaries, 'D50'" in result.err
+
+
+def test_tables_and_their_errors(run, tmp_path):
+    result = run("build", PRIMARIES, "-o", tmp_path, "--table", "17", "--json")
+    assert (result.code, result.err) == (0, "")
+    assert {"table-v4.icc", "table-mid.icc", "tables.txt"} <= set(os.listdir(tmp_path))
+    v4, mid = result.json["tables"]
+    assert set(v4["tags"]) == {"B2A0", "B2D0"}
+    assert 0 < mid["tags"]["A2M0"]["kd"]["mean"] < 0.02
+    by_table = iccbrdf.link([tmp_path / "table-mid.icc", tmp_path / "mvis.icc"])
+    exact = iccbrdf.link([tmp_path / "colour-mid.icc", tmp_path / "mvis.icc"])
+    values = np.random.default_rng(2).uniform(0.1, 0.4, (200, 6))
+    values[:, 3:] = (0.5, 0.5, 1)
+    assert np.abs(by_table(values) / exact(values) - 1).max() < 0.02
+
+
+def test_tables_hold_the_published_weights_only(run, tmp_path):
+    wrong = ["--table", "17", "--interpolation", "published", "--exponent", "1"]
+    result = run("build", PRIMARIES, "-o", tmp_path, *wrong)
+    assert (result.code, os.listdir(tmp_path)) == (2, [])

@@ -10,7 +10,10 @@ from pathlib import Path
 
 from iccbrdf.brdf.primaries import read_primaries
 from iccbrdf.brdf.slopes import read_slopes
-from iccbrdf.build import build_colour_mid, build_pair
+from iccbrdf.build import build_colour_mid, build_pair, build_tables
+
+GRID = 17
+"""Of the example tables, which are to stay small."""
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -18,13 +21,17 @@ ROOT = Path(__file__).resolve().parent.parent
 def files(primaries: Path) -> dict[str, bytes]:
     """What stands beside a primaries file: its profiles and their listings, by name.
 
-    The colour MID is made where there is a slopes file to go with it.
+    The colour MID and its tables are made where there is a slopes file to go with them.
     """
     source = read_primaries(primaries)
     slopes = primaries.with_name("slopes.json")
     if not slopes.exists():
         return build_pair(source).files
-    return build_pair(source).files | build_colour_mid(source, slopes=read_slopes(slopes)).files
+    return (
+        build_pair(source).files
+        | build_colour_mid(source, slopes=read_slopes(slopes)).files
+        | build_tables(source, grid=GRID).files
+    )
 
 
 def main() -> None:

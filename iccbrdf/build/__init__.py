@@ -9,14 +9,18 @@ from iccbrdf.build.colour_mid import (
 )
 from iccbrdf.build.models import MODELS
 from iccbrdf.build.pair import Pair, build_pair
+from iccbrdf.build.table import GRIDS, Tables, build_tables
 
 __all__ = [
+    "GRIDS",
     "INTERPOLATIONS",
     "MODELS",
     "SLOPE_METHODS",
     "ColourMid",
     "Pair",
+    "Tables",
     "build_colour_mid",
     "build_pair",
+    "build_tables",
     "last_slope",
 ]

@@ -64,6 +64,36 @@ _IDENTITY = Curve()
 
 
 @dataclass(frozen=True)
+class Tables:
+    """Both profiles of one map and grid, and how far they are from the map."""
+
+    profile: Profile
+    mid: Profile
+    errors: tuple[TableError, ...]
+
+    @property
+    def report(self) -> str:
+        """For people."""
+        return "\n\n".join(map(str, self.errors)) + "\n"
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """What is written to a folder, by file name."""
+        return {
+            "table-v4.icc": self.profile.to_bytes(),
+            "table-mid.icc": self.mid.to_bytes(),
+            "tables.txt": self.report.encode(),
+        }
+
+
+def build_tables(primaries: Primaries, *, method: InterpolationMethod = "smooth", grid: int = 33) -> Tables:
+    """Build `build_table_profile` and `build_table_mid`, which see."""
+    profile, profile_error = build_table_profile(primaries, method=method, grid=grid)
+    mid, mid_error = build_table_mid(primaries, method=method, grid=grid)
+    return Tables(profile, mid, (profile_error, mid_error))
+
+
+@dataclass(frozen=True)
 class _Nodes:
     """The exact map at the nodes of a table."""
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
+from typing import Literal
 
 import click
 
 from iccbrdf.brdf.primaries import MIN_NODES, read_primaries
 from iccbrdf.brdf.slopes import read_slopes
-from iccbrdf.build import INTERPOLATIONS, SLOPE_METHODS, build_colour_mid, build_pair
+from iccbrdf.build import GRIDS, INTERPOLATIONS, SLOPE_METHODS, build_colour_mid, build_pair, build_tables
 from iccbrdf.cli.options import emit, environment, force_option, json_option, name_list, scene_options
 from iccbrdf.errors import UsageError
 from iccbrdf.files import make_folder, write_together
@@ -19,6 +21,8 @@ Examples:
   iccbrdf build profiles/fogra39_gloss/primaries.json -o out
   The colour MID, from XYZ and normals, with slope adjustment:
   iccbrdf build primaries.json -o out --slopes slopes.json
+  The same as tables, for systems that run no calculator:
+  iccbrdf build primaries.json -o out --table 33
   Without the Fresnel term, and with other defaults for light and view:
   iccbrdf build primaries.json -o out --without fresnel --light 60,90 --view 10,270
 """
@@ -39,6 +43,8 @@ Examples:
 @click.option("--exponent", type=click.FloatRange(-4, 4), default=-1.0, show_default=True,
               help="Published interpolation: exponent of the distance as weight.  -1 (2020) gives near nodes "
               "more weight, 1 (printed in 2023) far ones.")  # fmt: skip
+@click.option("--table", "grid", type=click.Choice([str(grid) for grid in GRIDS]),
+              help="Also write the interpolation as tables of so many points an axis.")  # fmt: skip
 @click.option("--effects", metavar="NAMES", help="Simulate these effects only, separated by commas.")
 @click.option("--without", metavar="NAMES", help="Simulate all effects but these, separated by commas.")
 @click.option("--fresnel-angle", type=click.Choice(("theta_i", "alpha")),
@@ -52,9 +58,10 @@ def command(
     folder: Path,
     slopes: Path | None,
     slope_method: str | None,
-    interpolation: str | None,
+    interpolation: Literal["smooth", "published"] | None,
     p: float,
     exponent: float,
+    grid: str | None,
     effects: str | None,
     without: str | None,
     fresnel_angle: str | None,
@@ -71,7 +78,9 @@ def command(
     mvis.icc        the MVIS: the model, light and view
     colour-mid.icc  the colour MID: XYZ of the flat print and normals
     brdf-link.icc   after the colour MID: the BRDF image for the binding MID
-    *.txt           listings of their programs
+    table-mid.icc   with --table: the colour MID, without slopes, as a table
+    table-v4.icc    with --table: the same for systems of ICC version 4, XYZ to parameters
+    *.txt           listings of their programs, errors of the tables
 
     The colour MID interpolates between the primaries and needs four of them; without, it is left out.
     --light, --view and --env set the defaults that the profiles hold; whoever runs them may set others.
@@ -87,7 +96,7 @@ def command(
         variables=environment(light, view, env),
     )
     built = pair.files
-    wanted = interpolation is not None or slopes is not None
+    wanted = interpolation is not None or slopes is not None or grid is not None
     if slope_method is not None and slopes is None:
         raise UsageError("--slope-method needs --slopes, the measurements that it works with")
     colour = None
@@ -101,6 +110,12 @@ def command(
             exponent=exponent,
         )
         built |= colour.files
+    tables = None
+    if grid is not None:
+        if (p, exponent) != (2, -1):
+            raise UsageError("--table holds the published interpolation with --p 2 and --exponent -1 only")
+        tables = build_tables(source, method=interpolation or "smooth", grid=int(grid))
+        built |= tables.files
     make_folder(folder)
     files = {folder / name: data for name, data in built.items()}
     write_together(files, overwrite=force)
@@ -115,6 +130,7 @@ def command(
         "operators": len(compiled.program),
         "executed": compiled.executed,
         "colour_mid_executed": colour.compiled.executed if colour else None,
+        "tables": [asdict(error) for error in tables.errors] if tables else [],
         "files": [str(file) for file in files],
     }
     text = [
@@ -123,6 +139,7 @@ def command(
         f"colour MID: at most {colour.compiled.executed} operators run for a pixel"
         if colour
         else f"no colour MID: {len(source.primaries)} primaries, {MIN_NODES} are needed",
+        *([tables.report] if tables else []),
         *(f"  -> {file}" for file in files),
     ]
     emit(as_json, "iccbrdf.build/1", result, "\n".join(text))

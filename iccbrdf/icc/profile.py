@@ -252,7 +252,7 @@ def compute_profile_id(data: bytes) -> bytes:
 
 
 def read_profile(path: str | os.PathLike[str]) -> Profile:
-    """Read a profile from a file (ICC.2 version 5; also versions 2 and 4, whose tag types stay raw).
+    """Read a profile from a file (ICC.2 version 5; also versions 2 and 4, of whose tag types most stay raw).
 
     Raises
     ------
