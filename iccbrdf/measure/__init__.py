@@ -7,6 +7,15 @@ columns        which column is what
 reader         any of the files -> Measurements, by its declarations
 writer         Measurements -> our own CSV, whose header declares everything
 colorimetry    spectra and CIELAB to XYZ
+
+Nothing below is measured; it stands in for goniometric measurements of CMYK prints, which are not public:
+
+fogra39          colours of paper, solids and test patches
+smooth_spectra   XYZ -> spectra
+reflection       GGX, exact Fresnel term, rough diffuse base: not the models that are fitted
+synthetic_print  halftones of FOGRA39 on flat and slope
+goniometer       geometries, aperture, noise
+simulation       the files of `iccbrdf simulate`
 """
 
 from iccbrdf.measure.colorimetry import under

@@ -61,6 +61,11 @@ class Columns:
         """
         return np.stack([self.table.numbers(self._column(name)) for name in names], axis=-1)
 
+    @property
+    def wavelengths(self) -> Array:
+        """Of the spectral columns in nm, ascending, (wavelengths,)."""
+        return np.array(list(self.spectral))
+
     def spectra(self) -> Array:
         """Return the spectral columns as numbers, (rows, wavelengths)."""
         return np.stack([self.table.numbers(column) for column in self.spectral.values()], axis=-1)
@@ -80,7 +85,7 @@ class Columns:
 
     def _column(self, name: str) -> str:
         if name not in self.names:
-            raise self._error(
+            raise self.error(
                 f"no column {' or '.join(map(repr, NAMES[name]))}, and columns.{name} is not declared: "
                 f"{nearest(name, self.table.columns)}"
             )
@@ -90,9 +95,9 @@ class Columns:
         columns = self.table.columns
         for name, column in declared.items():
             if name not in NAMES:
-                raise self._error(f"columns: unknown name {name!r}: {nearest(name, NAMES)}")
+                raise self.error(f"columns: unknown name {name!r}: {nearest(name, NAMES)}")
             if column not in columns:
-                raise self._error(f"no column {column!r}, declared as {name}: {nearest(column, columns)}")
+                raise self.error(f"no column {column!r}, declared as {name}: {nearest(column, columns)}")
         found = dict(declared)
         for name, usual in NAMES.items():
             here = [column for column in usual if column in columns and column not in declared.values()]
@@ -113,15 +118,16 @@ class Columns:
                 continue
             wavelength = float(match[1])
             if wavelength in found:
-                raise self._error(f"columns {found[wavelength]!r} and {column!r} are of one wavelength")
+                raise self.error(f"columns {found[wavelength]!r} and {column!r} are of one wavelength")
             if _WAVELENGTHS[0] <= wavelength <= _WAVELENGTHS[1]:
                 found[wavelength] = column
         if not found and "spectral_prefix" in declared:
-            raise self._error(
+            raise self.error(
                 f"no column is named {declared.text('spectral_prefix', '')!r} and a wavelength: "
                 f"found {', '.join(self.table.columns)}"
             )
         return dict(sorted(found.items()))
 
-    def _error(self, message: str) -> InputError:
+    def error(self, message: str) -> InputError:
+        """Return an error about the table, to be raised by the caller."""
         return InputError(f"{self.table.file}: {message}")

@@ -172,18 +172,20 @@ def parse_declarations(items: Iterable[str]) -> dict[str, Any]:
     Examples
     --------
     >>> parse_declarations(["angles=radian", "scale=100", "columns.theta_i=Inc", "white=[0.9, 1, 1.1]"])
-    {'angles': 'radian', 'scale': 100, 'columns': {'theta_i': 'Inc'}, 'white': [0.9, 1, 1.1]}
+    {'angles': 'radian', 'scale': 100, 'white': [0.9, 1, 1.1], 'columns': {'theta_i': 'Inc'}}
     """
     values: dict[str, Any] = {}
+    columns: dict[str, str] = {}
     for item in items:
         key, equals, text = item.partition("=")
         if not key or not equals:
             raise UsageError(f"{item!r} is no declaration, expected KEY=VALUE")
-        table, dot, name = key.partition(".")
-        if dot:
-            values.setdefault(table, {})[name] = text
+        if key.startswith("columns."):
+            columns[key.removeprefix("columns.")] = text
         else:
             values[key] = _value(text)
+    if columns:
+        values["columns"] = columns
     return values
 
 

@@ -72,11 +72,17 @@ class Measurements:
         ):
             if array is not None and array.shape != shape:
                 raise UsageError(f"{name} has the shape {array.shape}, expected {shape}")
-        slopes = [0.0] * p if self.slopes is None else self.slopes.tolist()
-        keys = list(zip(self.patches, slopes, strict=True))
-        for k, (name, slope) in enumerate(keys):
-            if (name, slope) in keys[:k]:
+        keys = set()
+        for name, slope in self.keys:
+            if (name, slope) in keys:
                 raise UsageError(f"the patch {name!r} on the slope {slope:g} stands twice, expected once")
+            keys.add((name, slope))
+
+    @property
+    def keys(self) -> list[tuple[str, float]]:
+        """Name and slope of each patch; what has no slope is flat."""
+        slopes = [0.0] * len(self.patches) if self.slopes is None else self.slopes.tolist()
+        return list(zip(self.patches, slopes, strict=True))
 
     @property
     def light(self) -> Array:

@@ -68,42 +68,13 @@ def read_measurements(path: StrPath, **declarations: Any) -> Measurements:
     declared = declared.with_header(table.header)
     columns = Columns(table, declared)
 
-    quantity = declared.choice("quantity")
     theta_i, theta_r, phi = _angles(table, columns, declared)
     rows = _arrange(table, columns, theta_i, theta_r, phi)
+    readings = _readings(columns, declared, theta_i)
+    parts = [readings.XYZ] if readings.spectra is None else [readings.XYZ, readings.spectra]
+    values, repeats = _spread(rows, np.hstack(parts), path)
 
-    notes = list(table.notes)
-    has_XYZ, has_Lab = columns.has(TRISTIMULUS), columns.has(CIELAB)
-    of_spectra = bool(columns.spectral) and not has_XYZ and not has_Lab
-    illuminant = declared.choice("illuminant", SPECTRAL_ILLUMINANT if of_spectra else "")
-    observer = declared.choice("observer", SPECTRAL_OBSERVER if of_spectra else "")
-    white = declared.white() or white_of(illuminant, observer)
-
-    factor = _to_reflectance(quantity, theta_i)
-    wavelengths = spectra = None
-    if columns.spectral:
-        wavelengths = np.array(list(columns.spectral))
-        spectra = columns.spectra() * factor / declared.scale()
-    if has_XYZ:
-        XYZ = columns.numbers(*TRISTIMULUS) * factor / declared.scale()
-    elif has_Lab:
-        if quantity != "reflectance":
-            raise InputError(f"{path}: quantity is {quantity}, expected reflectance: the table holds CIELAB")
-        XYZ = Lab_to_XYZ(columns.numbers(*CIELAB), white)
-        notes.append("XYZ computed from CIELAB")
-    elif spectra is not None and wavelengths is not None:
-        gap = spectral_gap(wavelengths)
-        if gap:
-            raise InputError(f"{path}: {gap}")
-        XYZ = spectra @ weights(wavelengths, illuminant, observer)
-        notes.append("XYZ computed from the spectra")
-    else:
-        raise InputError(
-            f"{path}: found the columns {', '.join(table.columns)}, expected X, Y, Z, "
-            "or LAB_L, LAB_A, LAB_B, or wavelengths such as 400"
-        )
-
-    values, repeats = _spread(rows, XYZ if spectra is None else np.hstack([XYZ, spectra]), path)
+    notes = [*table.notes, *readings.notes]
     if repeats:
         notes.append(f"{repeats} repeated readings averaged")
     if columns.ignored():
@@ -115,16 +86,29 @@ def read_measurements(path: StrPath, **declarations: Any) -> Measurements:
         theta_r=angles[:, 1],
         phi=angles[:, 2],
         XYZ=values[..., :3],
-        illuminant=illuminant,
-        observer=observer,
-        white=white,
+        illuminant=readings.illuminant,
+        observer=readings.observer,
+        white=readings.white,
         source=declared.text("source", Path(path).name),
         cmyk=_inks(table, columns, rows) if columns.has(INKS) else None,
         slopes=np.array([slope for _, slope in rows.patches]) if "slope" in columns else None,
-        wavelengths=wavelengths,
-        spectra=None if spectra is None else values[..., 3:],
+        wavelengths=columns.wavelengths if columns.spectral else None,
+        spectra=values[..., 3:] if columns.spectral else None,
         notes=tuple(notes),
     )
+
+
+class _Readings(NamedTuple):
+    """Pi times the BRDF of each row of a long table."""
+
+    XYZ: Array
+    """(rows, 3)."""
+    spectra: Array | None
+    """(rows, wavelengths)."""
+    illuminant: str
+    observer: str
+    white: tuple[float, ...]
+    notes: tuple[str, ...] = ()
 
 
 class _Rows(NamedTuple):
@@ -173,15 +157,41 @@ def _check(table: Table, name: str, values: Array, valid: NDArray[np.bool_], exp
         raise InputError(f"{table.row(int(k))}: {name} is {values[k]:g} degrees, expected {expected}")
 
 
+def _readings(columns: Columns, declared: Declarations, theta_i: Array) -> _Readings:
+    quantity = declared.choice("quantity")
+    has_XYZ, has_Lab = columns.has(TRISTIMULUS), columns.has(CIELAB)
+    of_spectra = bool(columns.spectral) and not has_XYZ and not has_Lab
+    illuminant = declared.choice("illuminant", SPECTRAL_ILLUMINANT if of_spectra else "")
+    observer = declared.choice("observer", SPECTRAL_OBSERVER if of_spectra else "")
+    white = declared.white() or white_of(illuminant, observer)
+
+    spectra = None
+    if columns.spectral:
+        spectra = columns.spectra() * _to_reflectance(quantity, theta_i) / declared.scale()
+    if has_XYZ:
+        XYZ = columns.numbers(*TRISTIMULUS) * _to_reflectance(quantity, theta_i) / declared.scale()
+        return _Readings(XYZ, spectra, illuminant, observer, white)
+    if has_Lab:
+        if quantity != "reflectance":
+            raise columns.error(f"quantity is {quantity}, expected reflectance: the table holds CIELAB")
+        XYZ = Lab_to_XYZ(columns.numbers(*CIELAB), white)
+        return _Readings(XYZ, spectra, illuminant, observer, white, ("XYZ computed from CIELAB",))
+    if spectra is not None:
+        gap = spectral_gap(columns.wavelengths)
+        if gap:
+            raise columns.error(gap)
+        XYZ = spectra @ weights(columns.wavelengths, illuminant, observer)
+        return _Readings(XYZ, spectra, illuminant, observer, white, ("XYZ computed from the spectra",))
+    raise columns.error(
+        f"found the columns {', '.join(columns.table.columns)}, "
+        "expected X, Y, Z, or LAB_L, LAB_A, LAB_B, or wavelengths such as 400"
+    )
+
+
 def _to_reflectance(quantity: str, theta_i: Array) -> Array:
     """What a row's values are multiplied by to become pi times the BRDF, (rows, 1)."""
-    if quantity == "brdf":
-        factor = np.full_like(theta_i, np.pi)
-    elif quantity == "radiance":
-        factor = 1 / np.cos(np.radians(theta_i))
-    else:
-        factor = np.ones_like(theta_i)
-    return factor[:, np.newaxis]
+    factors = {"brdf": np.pi, "reflectance": 1.0, "radiance": 1 / np.cos(np.radians(theta_i))}
+    return np.broadcast_to(factors[quantity], theta_i.shape)[:, np.newaxis]
 
 
 def _arrange(table: Table, columns: Columns, theta_i: Array, theta_r: Array, phi: Array) -> _Rows:

@@ -28,11 +28,10 @@ def write_measurements(measurements: Measurements, path: StrPath, *, overwrite: 
         The file cannot be written, or exists and `overwrite` is not set.
     """
     with atomic_output(path, overwrite=overwrite) as temporary:
-        temporary.write_bytes(measurements_csv(measurements))
+        temporary.write_bytes(_csv(measurements).encode())
 
 
-def measurements_csv(measurements: Measurements) -> bytes:
-    """Return the bytes of the file; the same measurements give the same bytes."""
+def _csv(measurements: Measurements) -> str:
     in_plane = not measurements.phi.any()
     header = {
         "schema": SCHEMA,
@@ -73,7 +72,7 @@ def measurements_csv(measurements: Measurements) -> bytes:
     for patch, readings in zip(patch_rows, np.concatenate(samples, axis=-1).tolist(), strict=True):
         for angle, reading in zip(angles, readings, strict=True):
             writer.writerow([*patch, *angle, *map(_text, reading)])
-    return stream.getvalue().encode()
+    return stream.getvalue()
 
 
 def _text(value: float) -> str:
