@@ -23,8 +23,8 @@ def table_options(command: F) -> F:
         click.option(
             "--declare", "declare", multiple=True, metavar="KEY=VALUE",
             help="Declare one thing about the table; repeatable.  angles=degree|radian; "
-            "view_angles=lamp|mirror|azimuth; quantity=brdf|reflectance|radiance; scale=1|100; illuminant=D50; "
-            "observer=NAME; geometry=45:0; columns.theta_i=NAME, ...",
+            "view_angles=lamp|mirror|azimuth; quantity=brdf|reflectance|radiance; scale=1|100; "
+            "illuminant=D50; observer=NAME; geometry=45:0; columns.theta_i=NAME, ...",
         ),
     ):  # fmt: skip
         command = option(command)

@@ -22,7 +22,7 @@ NAMES: dict[str, tuple[str, ...]] = {
     "Y": ("Y", "XYZ_Y"),
     "Z": ("Z", "XYZ_Z"),
 }
-"""Our names, and what a column may be called that has not been declared: the first in the file counts."""
+"""Our names, and what a column may be called that has not been declared: the first that is there counts."""
 
 _SPECTRAL_PREFIX = r"(?:nm_?|r_?|spec_?|spectral_(?:nm_?)?)?"
 _WAVELENGTHS = (200.0, 2500.0)
@@ -86,7 +86,7 @@ class Columns:
     def _column(self, name: str) -> str:
         if name not in self.names:
             raise self.error(
-                f"no column {' or '.join(map(repr, NAMES[name]))}, and columns.{name} is not declared: "
+                f"no column {' or '.join(map(repr, NAMES[name]))}, and {_instead(name)} is not declared: "
                 f"{nearest(name, self.table.columns)}"
             )
         return self.names[name]
@@ -131,3 +131,8 @@ class Columns:
     def error(self, message: str) -> InputError:
         """Return an error about the table, to be raised by the caller."""
         return InputError(f"{self.table.file}: {message}")
+
+
+def _instead(name: str) -> str:
+    """The declaration that does without a usual name."""
+    return f"columns.{name} or geometry" if name.startswith("theta") else f"columns.{name}"

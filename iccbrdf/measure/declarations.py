@@ -107,8 +107,6 @@ class Declarations:
 
     def geometry(self) -> tuple[float, float]:
         """Return theta_i and theta_r in degrees of a table without angles."""
-        if "geometry" not in self:
-            raise self.missing("geometry", 'theta_i:theta_r in degrees, such as "45:0": there are no angles')
         text = self.record.text("geometry")
         try:
             theta_i, theta_r = (float(part) for part in text.split(":"))

@@ -29,7 +29,8 @@ class Measurements:
     Raises
     ------
     UsageError
-        Arrays whose shapes do not go together, or a patch (name and slope) that stands twice.
+        Arrays whose shapes do not go together, or a patch (name and slope) that stands twice or
+        has a name with blanks around it, which no text table would bring back.
     """
 
     patches: tuple[str, ...]
@@ -74,6 +75,8 @@ class Measurements:
                 raise UsageError(f"{name} has the shape {array.shape}, expected {shape}")
         keys = set()
         for name, slope in self.keys:
+            if not name or name != " ".join(name.split()):
+                raise UsageError(f"the patch {name!r} has a name that is empty or has blanks to spare")
             if (name, slope) in keys:
                 raise UsageError(f"the patch {name!r} on the slope {slope:g} stands twice, expected once")
             keys.add((name, slope))

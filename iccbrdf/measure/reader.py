@@ -132,7 +132,9 @@ def _read_table(path: StrPath, declared: Declarations) -> Table:
 
 def _angles(table: Table, columns: Columns, declared: Declarations) -> tuple[Array, Array, Array]:
     """theta_i, theta_r and phi of each row as `Measurements` has them."""
-    if "theta_i" not in columns and "theta_r" not in columns:
+    if "geometry" in declared:
+        if "theta_i" in columns or "theta_r" in columns:
+            raise columns.error("geometry is declared, but the table has columns of angles")
         theta_i, theta_r = (np.full(len(table.lines), angle) for angle in declared.geometry())
         phi = np.zeros_like(theta_i)
     else:
@@ -190,8 +192,12 @@ def _readings(columns: Columns, declared: Declarations, theta_i: Array) -> _Read
 
 def _to_reflectance(quantity: str, theta_i: Array) -> Array:
     """What a row's values are multiplied by to become pi times the BRDF, (rows, 1)."""
-    factors = {"brdf": np.pi, "reflectance": 1.0, "radiance": 1 / np.cos(np.radians(theta_i))}
-    return np.broadcast_to(factors[quantity], theta_i.shape)[:, np.newaxis]
+    factors = {
+        "brdf": np.full_like(theta_i, np.pi),
+        "reflectance": np.ones_like(theta_i),
+        "radiance": 1 / np.cos(np.radians(theta_i)),
+    }
+    return factors[quantity][:, np.newaxis]
 
 
 def _arrange(table: Table, columns: Columns, theta_i: Array, theta_r: Array, phi: Array) -> _Rows:
@@ -199,9 +205,12 @@ def _arrange(table: Table, columns: Columns, theta_i: Array, theta_r: Array, phi
     if "slope" in columns:
         slopes = columns.numbers("slope")[:, 0]
         _check(table, "slope", slopes, (slopes >= 0) & (slopes <= 90), "0 to 90")
+    names = columns.texts("patch")
+    if "" in names:
+        raise InputError(f"{table.row(names.index(''))}: the name of the patch is empty")
     patches: dict[tuple[str, float], int] = {}
     geometries: dict[tuple[float, float, float], int] = {}
-    keys = zip(columns.texts("patch"), slopes.tolist(), strict=True)
+    keys = zip(names, slopes.tolist(), strict=True)
     angles = zip(theta_i.tolist(), theta_r.tolist(), phi.tolist(), strict=True)
     patch = [patches.setdefault(key, len(patches)) for key in keys]
     geometry = [geometries.setdefault(key, len(geometries)) for key in angles]

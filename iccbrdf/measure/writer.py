@@ -65,8 +65,9 @@ def _csv(measurements: Measurements) -> str:
 
     stream = io.StringIO()
     for key, value in header.items():
-        # JSON's texts, numbers and lists are TOML's.
-        stream.write(f"# {key} = {json.dumps(value)}\n")
+        # JSON's texts, numbers and lists are TOML's, but for the escapes beyond 16 bits and the character DEL.
+        text = json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        stream.write(f"# {key} = {text}\n")
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([*patch_names, *names])
     for patch, readings in zip(patch_rows, np.concatenate(samples, axis=-1).tolist(), strict=True):
