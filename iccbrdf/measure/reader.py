@@ -138,8 +138,9 @@ def _angles(table: Table, columns: Columns, declared: Declarations) -> tuple[Arr
         theta_i, theta_r = (np.full(len(table.lines), angle) for angle in declared.geometry())
         phi = np.zeros_like(theta_i)
     else:
+        angles = columns.numbers("theta_i", "theta_r")
         unit = 1.0 if declared.choice("angles") == "degree" else np.degrees(1.0)
-        theta_i, theta_r = (columns.numbers("theta_i", "theta_r") * unit).T
+        theta_i, theta_r = (angles * unit).T
         phi = np.zeros_like(theta_i)
         side = declared.choice("view_angles")
         if side == "azimuth":

@@ -109,12 +109,13 @@ def read_csv(path: StrPath, delimiter: str) -> Table:
     if comments and _HEADER.match(comments[0]):
         header = header_declarations("\n".join(line[1:].strip() for line in comments), path)
     reader = csv.reader((f"{line}\n" for line in lines[start:]), delimiter=delimiter)
-    rows, numbers = [], []
+    rows, numbers, line = [], [], start
     try:
         for row in reader:
             if any(cell.strip() for cell in row):
                 rows.append([" ".join(cell.split()) for cell in row])
-                numbers.append(start + reader.line_num)
+                numbers.append(line + 1)
+            line = start + reader.line_num
     except csv.Error as error:
         raise InputError(f"{path}: line {start + reader.line_num}: {error}, expected CSV") from error
     return _table(path, rows[0] if rows else [], rows[1:], numbers[1:], header)

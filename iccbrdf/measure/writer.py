@@ -65,7 +65,7 @@ def _csv(measurements: Measurements) -> str:
 
     stream = io.StringIO()
     for key, value in header.items():
-        # JSON's texts, numbers and lists are TOML's, but for the escapes beyond 16 bits and the character DEL.
+        # JSON's texts, numbers and lists are TOML's, but for escapes beyond 16 bits and the character DEL.
         text = json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
         stream.write(f"# {key} = {text}\n")
     writer = csv.writer(stream, lineterminator="\n")
