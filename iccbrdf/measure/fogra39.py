@@ -50,5 +50,5 @@ TEST_PATCHES: Figures = {
 }
 """XYZ (Y = 100) of 15 patches of the Fogra Media Wedge, nine without black."""
 
-TONE_VALUE_INCREASE = (0.117, 0.140, 0.147, 0.167)
+TONE_VALUE_INCREASE = (0.117, 0.140, 0.148, 0.167)
 """Of C, M, Y, K at half tone: Murray-Davies on X, Y, Z, Y of the figures at 55, 55, 55 and 40 per cent."""

@@ -15,7 +15,11 @@ from iccbrdf.brdf.geometry import Array
 from iccbrdf.errors import UsageError
 
 _STEPS = 100
+"""Of Newton's method; the colours of prints take some ten."""
 _CLOSE = 1e-12
+"""Error of X, Y, Z."""
+_SMALL_CHANGE = 1e-6
+"""Of z in the last step, whose square is the error after it."""
 
 
 def smoothest_spectra(XYZ: ArrayLike, weights: ArrayLike) -> Array:
@@ -41,28 +45,32 @@ def smoothest_spectra(XYZ: ArrayLike, weights: ArrayLike) -> Array:
     UsageError
         No spectrum between 0 and 1 has these XYZ.
     """
-    XYZ, weights = np.asarray(XYZ, dtype=np.float64), np.asarray(weights, dtype=np.float64)
+    weights = np.asarray(weights, dtype=np.float64)
+    return np.stack([_smoothest(target, weights) for target in np.asarray(XYZ, dtype=np.float64)])
+
+
+def _smoothest(XYZ: Array, weights: Array) -> Array:
     w = len(weights)
     steps = np.diff(np.eye(w), axis=0)
     roughness = 2 * steps.T @ steps
-    spectra = np.empty((len(XYZ), w))
-    for k, target in enumerate(XYZ):
-        z, multipliers = np.full(w, np.arctanh(np.clip(2 * target[1] - 1, -0.999, 0.999))), np.zeros(3)
-        for _ in range(_STEPS):
-            tanh = np.tanh(z)
-            slope = (1 - tanh**2) / 2
-            gradient = roughness @ z + slope * (weights @ multipliers)
-            residual = weights.T @ ((1 + tanh) / 2) - target
-            constraints = slope[:, np.newaxis] * weights
-            curvature = roughness - 2 * np.diag(slope * tanh * (weights @ multipliers))
-            system = np.block([[curvature, constraints], [constraints.T, np.zeros((3, 3))]])
+    # The grey of this Y is the start.
+    z, multipliers = np.full(w, np.arctanh(np.clip(2 * XYZ[1] - 1, -0.999, 0.999))), np.zeros(3)
+    for _ in range(_STEPS):
+        tanh = np.tanh(z)
+        slope = (1 - tanh**2) / 2
+        gradient = roughness @ z + slope * (weights @ multipliers)
+        residual = weights.T @ ((1 + tanh) / 2) - XYZ
+        constraints = slope[:, np.newaxis] * weights
+        curvature = roughness - 2 * np.diag(slope * tanh * (weights @ multipliers))
+        system = np.block([[curvature, constraints], [constraints.T, np.zeros((3, 3))]])
+        try:
             change = np.linalg.solve(system, -np.concatenate([gradient, residual]))
-            # A full step from afar lands where tanh is flat.
-            change *= min(1.0, 1.0 / np.max(np.abs(change[:w])))
-            z, multipliers = z + change[:w], multipliers + change[w:]
-            if np.max(np.abs(residual)) < _CLOSE and np.max(np.abs(change[:w])) < _CLOSE**0.5:
-                break
-        else:
-            raise UsageError(f"no reflectance spectrum found for XYZ {target.tolist()}, Y = 1 for white")
-        spectra[k] = (1 + np.tanh(z)) / 2
-    return spectra
+        except np.linalg.LinAlgError:
+            break
+        # A full step from afar lands where tanh is flat.
+        change /= max(1.0, np.max(np.abs(change[:w])))
+        z, multipliers = z + change[:w], multipliers + change[w:]
+        if np.max(np.abs(residual)) < _CLOSE and np.max(np.abs(change[:w])) < _SMALL_CHANGE:
+            spectrum: Array = (1 + np.tanh(z)) / 2
+            return spectrum
+    raise UsageError(f"no reflectance spectrum found for the XYZ {XYZ.tolist()}, Y = 1 for white")
