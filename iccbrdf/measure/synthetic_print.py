@@ -63,7 +63,7 @@ def draw_behaviour(random: np.random.Generator) -> Behaviour:
     kinds = np.select([_SOLIDS[:, 3] > 0, inks > 1, inks == 1], ["black", "overprint", "one ink"], "paper")
     typical = np.array([_ALPHA[kind] for kind in kinds])
     return Behaviour(
-        alpha=typical * np.exp(random.normal(0, 0.06, len(typical))),
+        alpha=typical * random.uniform(0.88, 1.14, len(typical)),
         base_slope=float(np.radians(random.uniform(10, 25))),
         dispersion=float(random.uniform(0.003, 0.006)),
         thinning=float(random.uniform(0.3, 0.7)),
