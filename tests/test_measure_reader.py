@@ -294,6 +294,8 @@ def test_missing_geometry(tmp_path):
         ({"columns": {"theta": "Inc"}}, "columns: unknown name 'theta': did you mean 'theta_"),
         ({"columns": {"theta_i": "theta_in"}}, "no column 'theta_in', declared as theta_i: did you mean"),
         ({"format": "xlsx"}, "unknown format 'xlsx'"),
+        ({"delimiter": '"'}, "delimiter is .*, expected one character"),
+        ({"white": (1, 1)}, "white has 2 numbers, expected 3"),
         ({"delimiter": ";;"}, "delimiter is ';;', expected one character"),
     ],
 )
@@ -343,11 +345,14 @@ def test_tables_that_would_fill_the_memory(tmp_path, monkeypatch):
 
 
 def test_declarations_of_a_toml_file(tmp_path):
-    text = 'angles = "radian"\nscale = 100\n[columns]\npatch = "Name of patch"\n'
+    text = 'angles = "radian"\nscale = 100\nsource = 2023-05-01\n[columns]\npatch = "p"\n'
     path = write(tmp_path, text, "t.toml")
-    assert read_declarations(path) == {
-        "angles": "radian", "scale": 100, "columns": {"patch": "Name of patch"}
-    }  # fmt: skip
+    declared = read_declarations(path)
+    assert (declared["angles"], declared["scale"], declared["columns"]) == ("radian", 100, {"patch": "p"})
+    found = read(
+        tmp_path, TABLE.replace("patch", "p"), **{**FACTORS, **declared, "angles": "degree", "scale": 1}
+    )
+    assert found.source == "2023-05-01"
     with pytest.raises(InputError, match="is not TOML"):
         read_declarations(write(tmp_path, "angles: radian", "t.yaml"))
 

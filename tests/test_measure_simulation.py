@@ -24,7 +24,7 @@ from iccbrdf.measure.synthetic_print import (
 NO_ERRORS = {"sensor": Sensor(noise=0, aperture=0), "scatter": 0.0}
 FIGURES = {**{name: fogra39.SOLIDS[inks] for name, inks in PRIMARIES.items()},
            **{name: fogra39.TEST_PATCHES[inks] for name, inks in TESTS.items()}}  # fmt: skip
-NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(48)
+NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(64)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def hemisphere() -> tuple[np.ndarray, np.ndarray]:
     """Directions over the hemisphere and the projected solid angle of each, sum pi."""
     # sin^2 as the variable spreads the projected solid angle evenly.
     zenith = np.degrees(np.arcsin(np.sqrt((NODES + 1) / 2)))
-    azimuths = np.arange(0, 360, 5.0)
+    azimuths = np.arange(0, 360, 2.0)
     views = direction(zenith[:, np.newaxis], azimuths)
     share = np.broadcast_to(NODE_WEIGHTS[:, np.newaxis] * np.pi / 2 / len(azimuths), views.shape[:2])
     return views.reshape(-1, 3), share.ravel()

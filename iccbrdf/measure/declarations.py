@@ -27,6 +27,7 @@ whose first line is `# schema = "iccbrdf-measurements"`, as `write_measurements`
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -62,10 +63,12 @@ class Declarations:
     """The declarations about one file, checked as they are asked for."""
 
     def __init__(self, path: StrPath, values: Mapping[str, Any]) -> None:
-        self.record = Record(str(path), "declarations", dict(values))
+        # Through JSON, which `Record` is made for: tuples become lists, and TOML's dates become texts.
+        self.record = Record(str(path), "declarations", json.loads(json.dumps(dict(values), default=str)))
         self.record.check_keys(KEYS)
         for key in CHOICES:
-            self.choice(key, None)
+            if key in self:
+                self.choice(key)
 
     def __contains__(self, key: str) -> bool:
         return key in self.record.values
@@ -79,19 +82,19 @@ class Declarations:
         InputError
             The two contradict each other, or a key of the file's is unknown.
         """
-        values = dict(header)
+        values = Declarations(self.record.file, header).record.values
         for key, value in self.record.values.items():
             if values.setdefault(key, value) != value:
                 raise self.record.error(f"{key} is {value!r}, but the file says {values[key]!r}")
         return Declarations(self.record.file, values)
 
-    def choice(self, key: str, default: str | None = "") -> str:
-        """Return one of the words of `CHOICES`; an empty default means that it must be declared."""
+    def choice(self, key: str, default: str | None = None) -> str:
+        """Return one of the words of `CHOICES`; without a default it must be declared."""
         if key in self:
             return self.record.choice(key, CHOICES[key])
-        if default == "":
+        if default is None:
             raise self.missing(key, " or ".join(CHOICES[key]) if len(CHOICES[key]) < 5 else "its name")
-        return default or ""
+        return default
 
     def missing(self, key: str, expected: str) -> InputError:
         """Return the error about a declaration that is needed and not there."""
@@ -123,7 +126,7 @@ class Declarations:
     def delimiter(self) -> str:
         """Return the character between the fields of a CSV file."""
         delimiter = self.text("delimiter", ",") if self.record.values.get("delimiter") != "\t" else "\t"
-        if len(delimiter) != 1:
+        if len(delimiter) != 1 or delimiter in '"\r\n':
             raise self.record.error(f"delimiter is {delimiter!r}, expected one character")
         return delimiter
 

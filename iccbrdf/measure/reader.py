@@ -122,7 +122,7 @@ class _Rows(NamedTuple):
 
 def _read_table(path: StrPath, declared: Declarations) -> Table:
     ending = Path(path).suffix.lower()
-    format_ = declared.choice("format", _FORMATS.get(ending, ""))
+    format_ = declared.choice("format", _FORMATS.get(ending))
     if format_ == "cornell":
         return read_cornell(path)
     if format_ == "cgats":
@@ -164,8 +164,8 @@ def _readings(columns: Columns, declared: Declarations, theta_i: Array) -> _Read
     quantity = declared.choice("quantity")
     has_XYZ, has_Lab = columns.has(TRISTIMULUS), columns.has(CIELAB)
     of_spectra = bool(columns.spectral) and not has_XYZ and not has_Lab
-    illuminant = declared.choice("illuminant", SPECTRAL_ILLUMINANT if of_spectra else "")
-    observer = declared.choice("observer", SPECTRAL_OBSERVER if of_spectra else "")
+    illuminant = declared.choice("illuminant", SPECTRAL_ILLUMINANT if of_spectra else None)
+    observer = declared.choice("observer", SPECTRAL_OBSERVER if of_spectra else None)
     white = declared.white() or white_of(illuminant, observer)
 
     spectra = None
