@@ -15,6 +15,9 @@ import click
 from iccbrdf.errors import IccBrdfError, InputError, ProfileWarning, UsageError, nearest
 
 COMMANDS = {
+    "simulate": "Simulate goniometric measurements of a print.",
+    "fit": "Fit a reflection model to goniometric measurements.",
+    "evaluate": "Run the papers' experiments on measurements.",
     "build": "Make a MID and an MVIS profile from a primaries file.",
     "apply": "Map an image through profiles: XYZ TIFFs and PNG softproofs.",
     "dump": "Show what a profile holds.",
