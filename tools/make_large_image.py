@@ -28,22 +28,22 @@ def main() -> None:
     parser.add_argument("--compression", choices=("deflate", "zstd"))
     arguments = parser.parse_args()
 
-    scene = landscape(read_primaries(folder("profiles") / "landscape" / "primaries.json"))
-    scene_height, scene_width, _ = scene.device.shape
+    image = landscape(read_primaries(folder("profiles") / "landscape" / "primaries.json")).brdf
+    image_height, image_width, _ = image.device.shape
     side = round(math.sqrt(arguments.megapixels * 1e6))
-    columns = np.arange(side) % scene_width
+    columns = np.arange(side) % image_width
     with create_tiff(
         arguments.image,
         side,
         side,
-        scene.names,
+        image.names,
         samples="device",
         tile=(arguments.tile, arguments.tile) if arguments.tile else None,
         compression=arguments.compression,
     ) as sink:
         for y0 in range(0, side, ROWS):
-            rows = np.arange(y0, min(y0 + ROWS, side)) % scene_height
-            sink.write(Block(y0, 0, scene.device[rows][:, columns]))
+            rows = np.arange(y0, min(y0 + ROWS, side)) % image_height
+            sink.write(Block(y0, 0, image.device[rows][:, columns]))
 
 
 if __name__ == "__main__":
