@@ -24,9 +24,13 @@ def check_target(path: StrPath, *, overwrite: bool = False) -> Path:
     Raises
     ------
     UsageError
-        The file exists and `overwrite` is not set, its folder does not exist, or it is no regular file.
+        The file exists and `overwrite` is not set, its folder does not exist, or it is no regular file; or
+        `path` is no path.
     """
-    target = Path(os.path.realpath(path))
+    try:
+        target = Path(os.path.realpath(path))
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"not the path of a file to write: {error}") from None
     if not target.parent.is_dir():
         raise UsageError(f"{path}: cannot be written: the folder {target.parent} does not exist")
     if target.exists():

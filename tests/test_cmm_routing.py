@@ -250,6 +250,10 @@ def test_files(tmp_path):
         iccbrdf.link(tmp_path / "mid.icc")
     with pytest.raises(UsageError, match="no profile"):
         iccbrdf.link([])
+    with pytest.raises(UsageError, match="found None, expected a sequence"):
+        iccbrdf.link(None)
+    with pytest.raises(UsageError, match="not the path of a profile"):
+        iccbrdf.link([1, 2])
 
 
 @pytest.mark.parametrize(
@@ -261,7 +265,11 @@ def test_files(tmp_path):
         ({"samples": "devices"}, "did you mean 'device'"),
         ({"dtype": "float16"}, "valid are float32 and float64"),
         ({"dtype": "no type"}, "valid are float32 and float64"),
-        ({"threads": 0}, "expected at least 1"),
+        ({"threads": 0}, "expected a whole number of at least 1"),
+        ({"threads": "2"}, "threads is '2', expected a whole number"),
+        ({"threads": 1.5}, "threads is 1.5, expected a whole number"),
+        ({"channels": "ab"}, "channels: found 'ab', expected a sequence of names"),
+        ({"channels": 2}, "channels: found 2, expected a sequence of names"),
     ],
 )
 def test_unknown_arguments(arguments, message):

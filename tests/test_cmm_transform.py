@@ -191,6 +191,7 @@ def test_variables_of_an_existing_transform():
         ({"litX": "much"}, "found 'much'"),
         ({"litX": None}, "found None"),
         ({"litX": 1j}, "found 1j"),
+        ([("litX", 1)], "expected a mapping from names to numbers"),
     ],
 )
 def test_variables_that_do_not_fit(change, env, message):

@@ -1,4 +1,5 @@
 import hashlib
+import pickle
 
 import iccdev
 import numpy as np
@@ -174,6 +175,37 @@ def test_unreadable_files(tmp_path):
     (tmp_path / "empty.icc").write_bytes(b"")
     with pytest.raises(ProfileError, match=r"empty.icc: header: byte offset 0: size: found 0 bytes"):
         read_profile(tmp_path / "empty.icc")
+
+
+@pytest.mark.parametrize("path", [None, 3, b"a.icc", "nul\0.icc"])
+def test_what_is_no_path(path):
+    with pytest.raises(UsageError, match="not the path of a profile"):
+        read_profile(path)
+
+
+@pytest.mark.parametrize("path", [None, 3, "nul\0.icc"])
+def test_what_is_no_path_to_write_to(path):
+    with pytest.raises(UsageError, match="not the path of a file to write"):
+        write_profile(small(), path)
+
+
+def test_only_profiles_are_written(tmp_path):
+    # A number has a to_bytes of its own.
+    with pytest.raises(UsageError, match="found 5, expected a Profile"):
+        write_profile(5, tmp_path / "a.icc")
+    assert not list(tmp_path.iterdir())
+
+
+def test_pickling():
+    made = Profile(Header(device_class="mid "), dict.fromkeys(("desc", "cprt"), Utf8("a")))
+    read = Profile.from_bytes(made.to_bytes(), "a.icc")
+    changed = read.replace(tags={"targ": Utf8("b")})
+    for profile in (made, read, changed):
+        again = pickle.loads(pickle.dumps(profile))
+        assert again.to_bytes() == profile.to_bytes()
+        assert again.source == profile.source
+        assert [again[tag].text for tag in again] == [profile[tag].text for tag in profile]
+        assert [again.tag_offset(tag) for tag in again] == [profile.tag_offset(tag) for tag in profile]
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,8 @@ _LARGEST = float(np.finfo(np.float32).max)
 
 def checked_environment(env: Mapping[str, float], variables: Iterable[str]) -> dict[str, float]:
     """`env` with float values; VariableError for a name that no profile reads, or for what is no number."""
+    if not isinstance(env, Mapping):
+        raise VariableError(f"env is {env!r}, expected a mapping from names to numbers")
     variables = tuple(variables)
     checked = {}
     for name, value in env.items():

@@ -76,6 +76,12 @@ def link(
     """
     if isinstance(profiles, (str, os.PathLike, Profile)):
         raise UsageError("profiles: found a single one, expected a sequence, such as [mid, mvis]")
+    if not isinstance(profiles, Iterable):
+        raise UsageError(f"profiles: found {profiles!r}, expected a sequence, such as [mid, mvis]")
+    if channels is not None and (isinstance(channels, str) or not isinstance(channels, Sequence)):
+        raise UsageError(f"channels: found {channels!r}, expected a sequence of names")
+    if not isinstance(threads, (int, np.integer)) or threads < 1:
+        raise UsageError(f"threads is {threads!r}, expected a whole number of at least 1")
     chain = [p if isinstance(p, Profile) else read_profile(p) for p in profiles]
     if not chain:
         raise UsageError("no profile to link")
@@ -87,8 +93,6 @@ def link(
         if value not in valid:
             raise UsageError(f"{what} {value!r} is unknown: {nearest(str(value), valid)}")
     number_type = _number_type(dtype)
-    if threads < 1:
-        raise UsageError(f"threads is {threads}, expected at least 1")
 
     absolute = intent == "absolute"
     first, *others = stages(chain, intent)
@@ -116,7 +120,7 @@ def link(
         env=checked_environment(env or {}, variables),
         dtype=number_type,
         backend="interpreter",
-        threads=threads,
+        threads=int(threads),
     )
 
 

@@ -42,11 +42,15 @@ class MissingTagError(ProfileError, KeyError):
 class _Stored:
     """The data of one tag or of several that share it, as it stands in a file."""
 
-    def __init__(self, data: memoryview, source: str, signature: str, offset: int) -> None:
+    def __init__(self, data: bytes | memoryview, source: str, signature: str, offset: int) -> None:
         self.data = data
         self.offset = offset
         self._source = source
         self._signature = signature
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # A memoryview does not pickle.
+        return type(self), (bytes(self.data), self._source, self._signature, self.offset)
 
     @cached_property
     def value(self) -> Any:
@@ -74,8 +78,8 @@ class Profile(Mapping[str, Any]):
     nothing else.  Tags that share their data in the file are one object, and one object under several
     signatures is written once.
 
-    A profile does not change; `replace` makes a changed one, in which the tags that were not replaced keep
-    their bytes.  Two profiles are equal when they are written as the same bytes.
+    A profile does not change and pickles; `replace` makes a changed one, in which the tags that were not
+    replaced keep their bytes.  Two profiles are equal when they are written as the same bytes.
     """
 
     def __init__(self, header: Header, tags: Mapping[str, Record], *, source: str = "<new>") -> None:
@@ -258,6 +262,8 @@ def read_profile(path: str | os.PathLike[str]) -> Profile:
     ------
     InputError
         The file is missing or cannot be read.
+    UsageError
+        `path` is no path.
     ProfileError, UnsupportedError, LimitError
         As `Profile.from_bytes`; LimitError also for a file above `MAX_BYTES`.
     """
@@ -266,6 +272,8 @@ def read_profile(path: str | os.PathLike[str]) -> Profile:
             data = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"not the path of a profile: {error}") from None
     if len(data) > MAX_BYTES:
         raise LimitError(f"{path}: larger than the limit of {MAX_BYTES} bytes")
     return Profile.from_bytes(data, source=str(path))
@@ -274,9 +282,11 @@ def read_profile(path: str | os.PathLike[str]) -> Profile:
 def write_profile(profile: Profile, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write a profile to a file, which appears whole or not at all.
 
-    Raises UsageError where the file exists and `overwrite` is not set, or cannot be written; LimitError where
-    the disk is full.
+    Raises UsageError where the file exists and `overwrite` is not set, or cannot be written, or where
+    `profile` is none; LimitError where the disk is full.
     """
+    if not isinstance(profile, Profile):
+        raise UsageError(f"found {profile!r}, expected a Profile to write")
     data = profile.to_bytes()
     with atomic_output(path, overwrite=overwrite) as temporary:
         temporary.write_bytes(data)
