@@ -211,6 +211,7 @@ def test_errors_say_where_what_and_what_was_expected(body, expected):
         ({"effects": {"specula": True}}, "no effect 'specula' is declared; did you mean 'specular'?"),
         ({"variables": {"litx": 1}}, "no run-time variable 'litx' is declared; did you mean 'litX'?"),
         ({"variables": {"litX": float("inf")}}, "t.calc:5:1: litX is inf; expected 1 finite number"),
+        ({"variables": {"litX": 1e39}}, "litX is 1e+39; expected 1 finite number (float32)"),
     ],
 )
 def test_unknown_settings_name_the_nearest(settings, expected):

@@ -105,14 +105,15 @@ def _check_settings(templates: Sequence[Template], settings: Settings) -> None:
 
 
 def _numbers(given: ArrayLike, dimensions: int) -> np.ndarray[Any, np.dtype[np.float64]] | None:
-    """A setting as finite numbers, of 0 dimensions taken for 1; None if it is anything else."""
+    """A setting as numbers that float32 can hold, 0 dimensions taken for 1; None if it is anything else."""
     try:
         values = np.asarray(given).astype(np.float64, casting="safe")
     except (TypeError, ValueError):
         return None
     if values.ndim == 0:
         values = values[np.newaxis]
-    return values if values.ndim == dimensions and values.size and np.all(np.isfinite(values)) else None
+    fits = values.ndim == dimensions and values.size and np.all(np.abs(values) <= np.finfo(np.float32).max)
+    return values if fits else None
 
 
 class _Lowering:
@@ -244,7 +245,8 @@ class _Lowering:
             raise declared.place.error(f"the default of {name} has {len(default)} components, expected 1")
         given = _numbers(self._variables.get(name, default[0]), 1)
         if given is None or len(given) != 1:
-            raise declared.place.error(f"{name} is {self._variables[name]!r}; expected 1 finite number")
+            found = self._variables[name]
+            raise declared.place.error(f"{name} is {found!r}; expected 1 finite number (float32)")
         self._result.variables[name] = float(given[0])
         return self._graph.env(name, float(given[0]))
 
@@ -255,7 +257,8 @@ class _Lowering:
             given = _numbers(self._constants[name], 1)
             if given is None or len(given) != len(values):
                 found = self._constants[name]
-                raise declared.place.error(f"{name} is {found!r}; expected {len(values)} finite number(s)")
+                expected = f"{len(values)} finite number(s) (float32)"
+                raise declared.place.error(f"{name} is {found!r}; expected {expected}")
             values = tuple(given.tolist())
         self._result.constants[name] = values
         return self._graph.const(*values)
