@@ -321,6 +321,11 @@ def test_nodes_that_span_nothing_are_named(method, primaries, message) -> None:
         interpolate([0.3, 0.3, 0.3], primaries, method=method)
 
 
+def test_nodes_that_span_nothing_are_named_with_their_file() -> None:
+    with pytest.raises(InputError, match=r"fogra39_gloss/primaries\.json: primary 3 \(M\): XYZ is"):
+        interpolate([0.3, 0.3, 0.3], replaced(2, (0.1, 0.0, 0.1)))
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

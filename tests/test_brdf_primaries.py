@@ -144,6 +144,7 @@ DELETE = object()
         (("iluminant",), "D50", "unknown key 'iluminant': did you mean 'illuminant'?"),
         (("white",), [1, 1], "white has 2 numbers, expected 3"),
         (("white",), [1, 1, 0], "white[2] is 0, expected a number of at least 0.0001"),
+        (("white",), [96.42, 100, 82.49], "white[1] is 100, expected 1, the Y of the perfect diffuser"),
         (("refractive_index",), 0.9, "refractive_index is 0.9, expected a number of at least 1"),
         (("refractive_index",), True, "refractive_index is true, expected a number"),
         (("source",), " ", "source is empty, expected a text"),

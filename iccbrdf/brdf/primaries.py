@@ -8,7 +8,7 @@ A JSON object with these keys:
     refractive_index  of the coat; optional (1.5), only for models with a Fresnel term
     illuminant        of the XYZ and the parameters: "D50", ...
     observer          "CIE 1931 2 Degree Standard Observer" or "CIE 1964 10 Degree Standard Observer"
-    white             XYZ of the perfect diffuser; optional, by default of that illuminant and observer
+    white             XYZ of the perfect diffuser, Y = 1; optional, by default of that illuminant and observer
     geometry          of the XYZ: "45:0"
     source            where the figures come from
     encoding          what a device value of 1 stands for, by family of parameters; optional (1)
@@ -71,6 +71,8 @@ class Primaries:
     primaries: tuple[Primary, ...]
     encoding: Mapping[str, float] = field(default_factory=dict)
     refractive_index: float = REFRACTIVE_INDEX
+    file: str = field(default="", compare=False)
+    """Where it was read from, for messages."""
 
     @property
     def scales(self) -> Array:
@@ -101,8 +103,9 @@ def read_primaries(path: StrPath) -> Primaries:
     Raises
     ------
     InputError
-        The file cannot be read, a key is missing, unknown or of the wrong type, two primaries have the same
-        name, an XYZ is not positive, a parameter is out of the range of its encoding or m is below `M_MIN`.
+        The file cannot be read, a key is missing, unknown or of the wrong type, Y of the
+        white is not 1, two primaries have the same name, an XYZ is not positive, a parameter is out of the
+        range of its encoding or m is below `M_MIN`.
         The message names the file, the entry, what was found and what was expected.
     """
     record = read_record(path, SCHEMA, VERSION)
@@ -115,13 +118,12 @@ def read_primaries(path: StrPath) -> Primaries:
     record.check_keys([*keys, "encoding", "primaries"])
     illuminant = record.choice("illuminant", ILLUMINANTS)
     observer = record.choice("observer", OBSERVERS)
-    has_white = "white" in record.values
     encoding = _read_encoding(record, model)
     return Primaries(
         model=model.name,
         illuminant=illuminant,
         observer=observer,
-        white=record.numbers("white", 3, 1e-4) if has_white else white_of(illuminant, observer),
+        white=read_white(record, illuminant, observer),
         geometry=record.text("geometry"),
         source=record.text("source"),
         primaries=_read_entries(record, model, encoding),
@@ -129,6 +131,7 @@ def read_primaries(path: StrPath) -> Primaries:
         refractive_index=(
             record.number("refractive_index", 1) if "refractive_index" in record.values else REFRACTIVE_INDEX
         ),
+        file=record.file,
     )
 
 
@@ -142,11 +145,14 @@ def check_nodes(primaries: Primaries) -> None:
         Fewer than 4 or more than 16 primaries, an XYZ that is not above 0, or two of one colour.
     """
     count = len(primaries.primaries)
+    file = f"{primaries.file}: " if primaries.file else ""
     if not MIN_NODES <= count <= MAX_NODES:
-        raise InputError(f"{count} primaries, expected {MIN_NODES} to {MAX_NODES} to interpolate between")
+        raise InputError(
+            f"{file}{count} primaries, expected {MIN_NODES} to {MAX_NODES} to interpolate between"
+        )
     XYZ = primaries.XYZ
     for k, primary in enumerate(primaries.primaries):
-        where = f"primary {k + 1} ({primary.name})"
+        where = f"{file}primary {k + 1} ({primary.name})"
         if not np.all(XYZ[k] > 0):
             raise InputError(f"{where}: XYZ is {list(primary.XYZ)}, expected numbers above 0")
         same = np.flatnonzero(np.max(np.abs(XYZ[:k] - XYZ[k]), axis=-1) <= _COINCIDE)
@@ -215,6 +221,16 @@ def white_of(illuminant: str, observer: str) -> tuple[float, float, float]:
     spectrum = colour.SDS_ILLUMINANTS[illuminant].copy().align(matching_functions.shape)
     X, Y, Z = colour.sd_to_XYZ(diffuser, matching_functions, spectrum, method="Integration")
     return (float(X / Y), 1.0, float(Z / Y))
+
+
+def read_white(record: Record, illuminant: str, observer: str) -> tuple[float, ...]:
+    """Return the white that a file states, or else that of its illuminant and observer."""
+    if "white" not in record.values:
+        return white_of(illuminant, observer)
+    white = record.numbers("white", 3, 1e-4)
+    if white[1] != 1:
+        raise record.error(f"white[1] is {white[1]:g}, expected 1, the Y of the perfect diffuser")
+    return white
 
 
 def _read_encoding(record: Record, model: Model) -> dict[str, float]:

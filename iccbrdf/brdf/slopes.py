@@ -8,7 +8,7 @@ these keys:
     version           1
     illuminant        of the XYZ: "D50", ...
     observer          "CIE 1931 2 Degree Standard Observer" or "CIE 1964 10 Degree Standard Observer"
-    white             XYZ of the perfect diffuser; optional, by default of that illuminant and observer
+    white             XYZ of the perfect diffuser, Y = 1; optional, by default of that illuminant and observer
     geometry          of the XYZ, to the slope's own normal: "0:45"
     source            where the figures come from
     slopes            list of objects: angle in degrees, ascending from 0, and W and B, the XYZ of the printed
@@ -22,7 +22,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 from iccbrdf.brdf.colour_difference import XYZ_to_Lab, delta_E_CIE2000
 from iccbrdf.brdf.cook_torrance import channels
 from iccbrdf.brdf.geometry import Array
-from iccbrdf.brdf.primaries import ILLUMINANTS, OBSERVERS, white_of
+from iccbrdf.brdf.primaries import ILLUMINANTS, OBSERVERS, read_white
 from iccbrdf.brdf.records import Record, read_record, to_json
 from iccbrdf.errors import UsageError, nearest
 from iccbrdf.files import StrPath, atomic_output
@@ -61,6 +61,8 @@ class Slopes:
     geometry: str
     source: str
     slopes: tuple[Slope, ...]
+    file: str = field(default="", compare=False)
+    """Where it was read from, for messages."""
 
     @property
     def angles(self) -> Array:
@@ -239,8 +241,9 @@ def read_slopes(path: StrPath) -> Slopes:
     Raises
     ------
     InputError
-        The file cannot be read, or an entry is missing, unknown or out of range; among others, the slopes do
-        not ascend from 0, or a white is not lighter than its black in each of X, Y, Z.
+        The file cannot be read, or an entry is missing, unknown or out of range; among others, Y of the
+        white is not 1, the slopes do not ascend from 0, or a white on them is not lighter than its black in
+        each of X, Y, Z.
     """
     record = read_record(path, SCHEMA, VERSION)
     record.check_keys(
@@ -248,14 +251,14 @@ def read_slopes(path: StrPath) -> Slopes:
     )
     illuminant = record.choice("illuminant", ILLUMINANTS)
     observer = record.choice("observer", OBSERVERS)
-    has_white = "white" in record.values
     return Slopes(
         illuminant=illuminant,
         observer=observer,
-        white=record.numbers("white", 3, 1e-4) if has_white else white_of(illuminant, observer),
+        white=read_white(record, illuminant, observer),
         geometry=record.text("geometry"),
         source=record.text("source"),
         slopes=_read_entries(record),
+        file=record.file,
     )
 
 

@@ -120,12 +120,13 @@ def last_slope(profile: Profile) -> float | None:
 
 
 def _check_slopes(primaries: Primaries, slopes: Slopes) -> None:
+    file = slopes.file or "slopes"
     if len(slopes.slopes) < 2:
-        raise InputError("slopes: found the flat print alone, expected at least one slope beside it")
+        raise InputError(f"{file}: found the flat print alone, expected at least one slope beside it")
     for what in ("illuminant", "observer"):
         found, expected = getattr(slopes, what), getattr(primaries, what)
         if found != expected:
-            raise InputError(f"slopes: {what}: found {found!r}, expected that of the primaries, {expected!r}")
+            raise InputError(f"{file}: {what}: found {found!r}, expected that of the primaries, {expected!r}")
 
 
 def _nodes(primaries: Primaries, interpolation: str, p: float, exponent: float) -> dict[str, Any]:
