@@ -11,7 +11,7 @@ References
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -25,7 +25,7 @@ from iccbrdf.brdf.fit_uncertainty import confidence_intervals
 from iccbrdf.brdf.geometry import Array, unit
 from iccbrdf.brdf.models import find_model
 from iccbrdf.brdf.primaries import REFRACTIVE_INDEX
-from iccbrdf.errors import UsageError, nearest
+from iccbrdf.errors import InputError, UsageError, nearest
 
 Solver = Literal["least_squares", "nelder_mead"]
 
@@ -94,6 +94,7 @@ def fit(
     as_published: bool = False,
     starts: int | ArrayLike = STARTS,
     repeat_scatter: float = 0.0,
+    patches: Sequence[str] | None = None,
 ) -> FitResult:
     """
     Fit a reflection model to each of p patches.
@@ -125,6 +126,8 @@ def fit(
         refractive index last where it is free.
     repeat_scatter
         Root mean square CIEDE2000 between repeated readings, to be taken off the lack of fit.
+    patches
+        Names for messages, p of them.
 
     Returns
     -------
@@ -133,8 +136,9 @@ def fit(
     Raises
     ------
     UsageError
-        An unknown name, arrays that do not go together, a light or viewer not above the surface, or a patch
-        measured in no more geometries than it has parameters.
+        An unknown name, arrays that do not go together, or a light or viewer not above the surface.
+    InputError
+        A patch was measured in no more geometries than it has parameters.
 
     Examples
     --------
@@ -144,12 +148,13 @@ def fit(
     >>> light, view = planar(-theta_i), planar(theta_v)
     >>> truth = [0.5, 0.4, 0.1, 0.2, 0.2, 0.2, 0.25]
     >>> XYZ = evaluate("brdf1", truth, planar(0), light, view, intensity=np.pi / light[:, 2:])
-    >>> fit(XYZ[np.newaxis], light, view, [0.9642, 1, 0.8249]).parameters.round(6)
-    array([[0.5 , 0.4 , 0.1 , 0.2 , 0.2 , 0.2 , 0.25]])
+    >>> fit(XYZ[np.newaxis], light, view, [0.9642, 1, 0.8249]).parameters.round(6).tolist()
+    [[0.5, 0.4, 0.1, 0.2, 0.2, 0.2, 0.25]]
     """
     problem = _problem(XYZ, light, view, white, model, objective, refractive_index, as_published)
     if solver not in SOLVERS:
         raise UsageError(f"unknown solver {solver!r}: {nearest(solver, SOLVERS)}")
+    _check_counts(problem, patches)
     started = time.perf_counter()
     optima, values = SOLVERS[solver](problem, _starts(problem, starts))
     seconds = time.perf_counter() - started
@@ -215,15 +220,17 @@ def _problem(
                 f"{name} {below[0]} is {vectors[below[0]].round(6).tolist()}, expected above the surface"
             )
     index = None if refractive_index == "free" else float(refractive_index)
-    problem = Problem(entry, XYZ, light, view, white, objective, index, as_published)
-    measured, k = np.count_nonzero(problem.measured, axis=1), len(problem.names)
-    few = np.flatnonzero(measured <= k)
-    if few.size:
-        raise UsageError(
-            f"patch {few[0]} was measured in {measured[few[0]]} geometries, "
-            f"expected more than the {k} parameters of the fit"
-        )
-    return problem
+    return Problem(entry, XYZ, light, view, white, objective, index, as_published)
+
+
+def _check_counts(problem: Problem, patches: Sequence[str] | None) -> None:
+    k = len(problem.names)
+    for p, count in enumerate(np.count_nonzero(problem.measured, axis=1)):
+        if count <= k:
+            raise InputError(
+                f"patch {patches[p] if patches is not None else p} was measured in {count} geometries, "
+                f"expected more than the {k} parameters of the fit"
+            )
 
 
 def _starts(problem: Problem, starts: int | ArrayLike) -> Array:

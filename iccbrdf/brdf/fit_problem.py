@@ -187,12 +187,12 @@ class Problem:
 
 def CIEDE2000_components(Lab_1: ArrayLike, Lab_2: ArrayLike) -> Array:
     """
-    Return three numbers whose squares add up to the square of CIEDE2000, the same smooth function each.
+    Return three numbers whose squares add up to the square of CIEDE2000.
 
     dE^2 = L^2 + C^2 + H^2 + R C H = L^2 + (C + R H / 2)^2 + (1 - R^2 / 4) H^2 with |R| <= 2.  Least squares
     on the three converges as on any smooth residual, where dE itself has a kink at 0.  The mean hue is the
-    bisector of two unit vectors and its multiples are polynomials of its cosine and sine, which costs a
-    third of the formula in angles.
+    bisector of two unit vectors and its multiples are polynomials of its cosine and sine, which takes three
+    quarters of the time of the formula in angles.
 
     Parameters
     ----------

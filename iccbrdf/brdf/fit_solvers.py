@@ -25,16 +25,16 @@ _LEAST_OF_STARTS = 1e-3
 _ITERATIONS = 200
 _LARGEST_STEP = 2.0
 """Of a logarithm: further, the linear model of the residuals says nothing."""
-_STEP_TOLERANCE = 1e-10
-_COST_TOLERANCE = 1e-13
-_LARGEST_DAMPING = 1e12
-_LEAST_DISTANCE = 1e-3
+_STEP_TOLERANCE = 1e-9
+_COST_TOLERANCE = 1e-12
+_LEAST_DAMPING, _LARGEST_DAMPING = 1e-12, 1e12
+_LEAST_DISTANCE = 3e-3
 """The mean of colour differences is smoothed below this, where its derivative jumps."""
-_BATCH = 32
+_BATCH = 64
 """Starts that are solved together: as many as keep their residuals in the processor's cache."""
 
 _EVALUATIONS = 5000
-_SIMPLEX_TOLERANCE = 1e-7
+_SIMPLEX_TOLERANCE = 1e-5
 
 
 def data_starts(problem: Problem, count: int) -> Array:
@@ -94,8 +94,7 @@ def least_squares(problem: Problem, starts: Array) -> tuple[Array, Array]:
     """
     Minimise the objective from each start by Levenberg-Marquardt [Marquardt1963], within the bounds.
 
-    The mean of colour differences is minimised by reweighting: each step is one of least squares with the
-    weights 1 / dE, which majorises it.
+    The mean of colour differences takes the Hessian of their distances in place of that of their squares.
 
     Parameters
     ----------
@@ -135,7 +134,7 @@ def _levenberg_marquardt(problem: Problem, logs: Array, patch: NDArray[np.intp])
         moved = np.max(np.abs(trial - logs[active]), axis=-1)
         gain = cost[active] - new_cost
         done = better & ((moved <= _STEP_TOLERANCE) | (gain <= _COST_TOLERANCE * new_cost))
-        damping[active] *= np.where(better, 0.1, 8.0)
+        damping[active] = np.maximum(damping[active] * np.where(better, 0.1, 8.0), _LEAST_DAMPING)
         done |= damping[active] > _LARGEST_DAMPING
         accepted = active[better]
         logs[accepted], cost[accepted] = trial[better], new_cost[better]
@@ -150,17 +149,17 @@ def _levenberg_marquardt(problem: Problem, logs: Array, patch: NDArray[np.intp])
 def _quadratic(problem: Problem, residuals: Array, jacobian: Array) -> tuple[Array, Array, Array]:
     """Cost (b,), gradient (b, k) and Gauss-Newton Hessian (b, k, k) of the objective's sum."""
     squared = np.sum(residuals**2, axis=-1)
-    if problem.objective == "mean CIEDE2000":
-        distance = np.sqrt(squared + _LEAST_DISTANCE**2)
-        cost = np.sum(distance, axis=-1)
-        scale = distance[..., np.newaxis] ** -0.5
-        residuals, jacobian = residuals * scale, jacobian * scale[..., np.newaxis]
-    else:
-        cost = np.sum(squared, axis=-1) / 2
-    rows = jacobian.reshape(len(jacobian), -1, jacobian.shape[-1])
-    columns = np.swapaxes(rows, -1, -2)
-    gradient = (columns @ residuals.reshape(len(residuals), -1, 1))[..., 0]
-    return cost, gradient, columns @ rows
+    gradients = np.einsum("bgck,bgc->bgk", jacobian, residuals)
+    rows = jacobian.reshape(*residuals.shape[:1], -1, jacobian.shape[-1])
+    if problem.objective != "mean CIEDE2000":
+        return np.sum(squared, axis=-1) / 2, gradients.sum(axis=1), np.swapaxes(rows, -1, -2) @ rows
+    # The distance d = |r| has the gradient J' u and the Hessian J' (I - u u') J / d, with u = r / d.
+    distance = np.sqrt(squared + _LEAST_DISTANCE**2)[..., np.newaxis]
+    gradients /= distance
+    weighted = (jacobian / distance[..., np.newaxis]).reshape(rows.shape)
+    along = gradients / np.sqrt(distance)
+    hessian = np.swapaxes(weighted, -1, -2) @ rows - np.swapaxes(along, -1, -2) @ along
+    return distance[..., 0].sum(axis=-1), gradients.sum(axis=1), hessian
 
 
 def _step(gradient: Array, hessian: Array, damping: Array, logs: Array, low: Array, high: Array) -> Array:
@@ -171,9 +170,10 @@ def _step(gradient: Array, hessian: Array, damping: Array, logs: Array, low: Arr
     # A parameter without effect, as m is of a lobe that is not there, keeps a slope to stand on.
     scale = np.maximum(diagonal, 1e-12 * diagonal.max(axis=-1, keepdims=True)) + np.finfo(np.float64).tiny
     both = free[:, :, np.newaxis] & free[:, np.newaxis, :]
-    damped = np.where(both, hessian, 0.0) + np.eye(k) * np.where(
-        free, damping[:, np.newaxis] * scale, 1.0
-    )[:, np.newaxis]
+    damped = (
+        np.where(both, hessian, 0.0)
+        + np.eye(k) * np.where(free, damping[:, np.newaxis] * scale, 1.0)[:, np.newaxis]
+    )
     step = -np.linalg.solve(damped, np.where(free, gradient, 0.0)[..., np.newaxis])[..., 0]
     return np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
 

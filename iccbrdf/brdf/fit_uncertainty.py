@@ -26,7 +26,7 @@ def confidence_intervals(problem: Problem, parameters: Array) -> Array:
     """
     Return 95 % confidence intervals of fitted parameters, by the sandwich clustered by geometry.
 
-    The covariance of the logarithms is A^-1 M A^-1 g / (g - k): A the Hessian of the objective, M the sum of
+    The covariance of the logarithms is A^-1 M A^-1 g / (g - k), A the Hessian of the objective, M the sum of
     the squared gradients of the geometries [White1982], the three components at a geometry being one cluster
     [Liang1986], as an error of its angle or its aperture moves them together.  Quantiles are Student's with
     g - k degrees of freedom.  The intervals answer for scatter between geometries, not for a model that does
@@ -55,17 +55,16 @@ def confidence_intervals(problem: Problem, parameters: Array) -> Array:
         along = gradients[..., np.newaxis] * gradients[..., np.newaxis, :]
         hessians = (hessians - along) / distance[..., np.newaxis]
     bread = hessians.sum(axis=1)
-    meat = np.swapaxes(gradients, -1, -2) @ gradients
     geometries = np.count_nonzero(problem.measured, axis=-1)
     freedom = np.maximum(geometries - k, 1)
 
     inside = (logs > low) & (logs < high)
     both = inside[:, :, np.newaxis] & inside[:, np.newaxis, :]
-    scale = np.sqrt(np.maximum(np.einsum("pii->pi", bread), np.finfo(np.float64).tiny))
-    scales = scale[:, :, np.newaxis] * scale[:, np.newaxis, :]
-    inverse = np.linalg.inv(np.where(both, bread / scales, np.eye(k)) + _RIDGE * np.eye(k))
-    covariance = inverse @ np.where(both, meat / scales, 0.0) @ inverse
-    variance = np.einsum("pii->pi", covariance) / scale**2 * (geometries / freedom)[:, np.newaxis]
+    scale = np.sqrt(np.maximum(np.einsum("pii->pi", bread), np.finfo(np.float64).tiny))[:, np.newaxis]
+    bread = np.where(both, bread / (scale * np.swapaxes(scale, -1, -2)), np.eye(k)) + _RIDGE * np.eye(k)
+    # A^-1 M A^-1 is the sum over the geometries of squares of A^-1 times the gradient of each.
+    influence = np.where(inside[:, np.newaxis], gradients / scale, 0.0) @ np.linalg.inv(bread) / scale
+    variance = np.sum(influence**2, axis=1) * (geometries / freedom)[:, np.newaxis]
     reach = stdtrit(freedom, (1 + CONFIDENCE) / 2)[:, np.newaxis] * np.sqrt(variance)
     ends = np.stack([np.maximum(logs - reach, low), np.minimum(logs + reach, high)], axis=-1)
     return np.where(inside[..., np.newaxis], np.exp(ends), np.nan)
