@@ -189,9 +189,7 @@ _FORMULAS: Mapping[int, Callable[..., Value]] = {
     6: lambda x, w, g, a, b, c, d, e: (
         d * np.power(np.maximum(e * np.power(x, g) - a, 0) / (b - c * np.power(x, g)), w)
     ),
-    7: lambda x, w, g, a, b, c, d: (
-        d * np.power((a + b * np.power(x, g)) / (1 + c * np.power(x, g)), w)
-    ),
+    7: lambda x, w, g, a, b, c, d: d * np.power((a + b * np.power(x, g)) / (1 + c * np.power(x, g)), w),
 }
 
 _CURVES: Mapping[str, Callable[[Any, Value, Environment], Value]] = {

@@ -15,7 +15,6 @@ MAX_NESTING = 64
 """Blocks inside blocks; no compiler needs more, and a hostile file would exhaust the call stack."""
 
 
-
 class Op(NamedTuple):
     """One operation as stored: its signature without the padding blanks, and its four operand bytes as a u32.
 
@@ -301,8 +300,10 @@ class _Parser:
         if operand is Operand.NONE and argument is not None:
             raise self._error(f"{word!r} takes no argument, found {argument!r}")
         if operand is Operand.LENGTH:
-            raise self._error(f"found {token[0]!r} out of place; blocks are written if {{}} else {{}} or"
-                              " sel case {} dflt {}")
+            raise self._error(
+                f"found {token[0]!r} out of place; blocks are written if {{}} else {{}} or"
+                " sel case {} dflt {}"
+            )
         return Op(word, self._operand(word, operand, argument))
 
     def _bits(self, number: str) -> int:

@@ -71,6 +71,7 @@ def verify_element(element: Element, *, where: str = "element") -> tuple[Checked
 # Elements that are checked already, by id: a file may share one a thousand times.
 _Known: TypeAlias = dict[int, tuple[Checked, ...]]
 
+
 def _verify_element(element: Element, where: str, level: int, known: _Known) -> tuple[Checked, ...]:
     if id(element) not in known:
         known[id(element)] = tuple(
@@ -223,6 +224,4 @@ class _Walk:
     def nest(self, level: int) -> None:
         self.nesting = max(self.nesting, level)
         if level > MAX_NESTING:
-            raise LimitError(
-                f"{self.where}: blocks and calculators are nested more than {MAX_NESTING} deep"
-            )
+            raise LimitError(f"{self.where}: blocks and calculators are nested more than {MAX_NESTING} deep")
