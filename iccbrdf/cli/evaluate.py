@@ -13,12 +13,13 @@ from iccbrdf.build import INTERPOLATIONS, SLOPE_METHODS
 from iccbrdf.cli.options import emit, force_option, json_option
 from iccbrdf.errors import UsageError
 from iccbrdf.files import make_folder, write_together
-from iccbrdf.report import evaluate_print, orderings, read_print, tables
+from iccbrdf.report import evaluate_print, histograms, orderings, read_print, tables
 
 EPILOG = """
 \b
 Examples:
-  iccbrdf simulate -o print && iccbrdf evaluate print --plots print/plots
+  iccbrdf simulate -o print
+  iccbrdf evaluate print --plots print/plots
   To the letter of the papers:
   iccbrdf evaluate print --as-published --interpolation published --slope-method published
 """
@@ -73,6 +74,7 @@ def command(
         "slope_method": slope_method,
         "tables": [table.to_dict() for table in found],
         "wilcoxon": asdict(evaluation.wilcoxon),
+        "histograms": histograms(evaluation.slopes),
         "orderings": [claim.to_dict() for claim in claims],
         "files": [str(file) for file in files],
     }

@@ -19,7 +19,7 @@ References
 from iccbrdf.report.evaluation import Evaluation, evaluate_print
 from iccbrdf.report.orderings import Ordering, orderings
 from iccbrdf.report.print_data import PrintData, read_print
-from iccbrdf.report.tables import Table, tables
+from iccbrdf.report.tables import Table, histograms, tables
 
 __all__ = [
     "Evaluation",
@@ -27,6 +27,7 @@ __all__ = [
     "PrintData",
     "Table",
     "evaluate_print",
+    "histograms",
     "orderings",
     "read_print",
     "tables",

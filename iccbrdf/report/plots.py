@@ -11,7 +11,7 @@ from iccbrdf.brdf.fit_diagnostics import REGIONS
 from iccbrdf.brdf.geometry import Array
 from iccbrdf.report.appearance import MEASURED, Appearance, mean
 from iccbrdf.report.evaluation import INTERPOLATED, OPTIMISED, Evaluation, ModelEvaluation
-from iccbrdf.report.tables import MODEL_NAMES, by_rmsd, ranked
+from iccbrdf.report.tables import MODEL_NAMES, by_rmsd, histograms, ranked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 _D50 = (0.9642, 1.0, 0.8249)
 _STYLES = ("k.", "-", "--")
 _DPI = 100
+_MARGIN = 0.75
+"""Inches."""
 
 
 def plots(evaluation: Evaluation) -> dict[str, bytes]:
@@ -63,27 +65,38 @@ def _panels(appearance: Appearance, patch: int, title: str) -> bytes:
     for theta_i, (curves, strips) in zip(incidences, axes.T, strict=True):
         rows = np.flatnonzero(measurements.in_plane & (measurements.theta_i == theta_i))
         rows = rows[np.argsort(measurements.theta_r[rows])]
-        theta_r = measurements.theta_r[rows]
-        for source, style in zip(sources, _STYLES, strict=False):
-            curves.plot(theta_r, appearance.XYZ(source)[patch, rows, 1], style, label=source)
+        XYZ = np.stack([appearance.XYZ(source)[patch, rows] for source in sources])
+        theta_r, XYZ = _with_gaps(measurements.theta_r[rows], XYZ)
+        for source, style, Y in zip(sources, _STYLES, XYZ[..., 1], strict=False):
+            curves.plot(theta_r, Y, style, label=source)
         curves.set(title=f"theta_i {theta_i:g}", ylim=(0, None))
-        colours = np.stack([appearance.XYZ(source)[patch, rows] for source in sources])
-        _strips(strips, theta_r, colours, np.array(measurements.white))
+        _strips(strips, theta_r, XYZ, np.array(measurements.white))
         strips.set(xlabel="theta_r, degrees", yticks=[])
     axes[0, 0].set_ylabel("Y")
     axes[0, 0].legend()
     return _png(figure)
 
 
+def _with_gaps(theta_r: Array, XYZ: Array) -> tuple[Array, Array]:
+    """Angles and XYZ (sources, angles, 3), with NaN where the lamp hides the print, which no line crosses."""
+    steps = np.diff(theta_r)
+    gaps = np.flatnonzero(steps > 1.5 * np.median(steps)) + 1 if steps.size else np.array([], dtype=int)
+    filled = np.insert(theta_r, gaps, (theta_r[gaps] + theta_r[gaps - 1]) / 2)
+    return filled, np.insert(XYZ, gaps, np.nan, axis=1)
+
+
 def _strips(axes: Axes, theta_r: Array, XYZ: Array, white: Array) -> None:
     """Colours (sources, angles, 3) as rows of fields, centred on their angles, each as a display has it."""
     from iccbrdf.images.display import xyz_to_srgb
 
+    measured = np.isfinite(XYZ).all(axis=-1, keepdims=True).astype(np.float32)
     # To the display's white by ratios of XYZ: for the eye, not for figures.
-    rgb = xyz_to_srgb((np.nan_to_num(XYZ) * (_D50 / white)).astype(np.float32)).clip(0, 1)
+    rgb = xyz_to_srgb((XYZ * (_D50 / white)).astype(np.float32)).clip(0, 1)
     between = (theta_r[1:] + theta_r[:-1]) / 2
-    edges = np.concatenate([theta_r[:1] - 2.5, between, theta_r[-1:] + 2.5])
-    axes.pcolormesh(edges, np.arange(len(XYZ) + 1), rgb)
+    ends = (1.5 * theta_r[[0, -1]] - 0.5 * theta_r[[1, -2]]) if len(theta_r) > 1 else theta_r[0] + [-1, 1]
+    edges = np.concatenate([ends[:1], between, ends[1:]])
+    axes.pcolormesh(edges, np.arange(len(XYZ) + 1), np.concatenate([rgb, measured], axis=-1))
+    axes.patch.set(hatch="////", edgecolor="0.7")
     axes.invert_yaxis()
 
 
@@ -101,10 +114,9 @@ def _chromaticities(found: ModelEvaluation, name: str) -> bytes:
 def _histogram(slopes: Appearance) -> bytes:
     figure = _figure(6, 4)
     axes = figure.subplots()
-    for source in ("IB", "AIB"):
-        differences = slopes.differences(source)
-        values = differences[np.isfinite(differences)]
-        axes.hist(values, bins=np.arange(0, values.max() + 1, 0.5).tolist(), histtype="step", label=source)
+    edges, *counts = histograms(slopes).items()
+    for source, values in counts:
+        axes.stairs(values, edges[1], label=source)
     axes.set(xlabel="CIEDE2000", ylabel="readings", title="Test patches on slopes")
     axes.legend()
     return _png(figure)
@@ -114,7 +126,11 @@ def _figure(width: float, height: float) -> Figure:
     # Takes a second to import.
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), dpi=_DPI, constrained_layout=True)
+    figure = Figure(figsize=(width, height), dpi=_DPI)
+    # Matplotlib's own layout of panels takes as long as the rest of the picture.
+    left, bottom = _MARGIN / width, _MARGIN / height
+    figure.subplots_adjust(left, bottom, 1 - left / 4, 1 - bottom, wspace=0.25, hspace=0.1)
+    return figure
 
 
 def _png(figure: Figure) -> bytes:

@@ -87,6 +87,14 @@ def tables(evaluation: Evaluation) -> list[Table]:
     ]
 
 
+def histograms(slopes: Appearance) -> dict[str, list[float]]:
+    """Return `edges`, half a CIEDE2000 apart, and the numbers of readings between them for IB and AIB."""
+    differences = {source: slopes.differences(source) for source in ("IB", "AIB")}
+    edges = np.arange(0, max(largest(values) for values in differences.values()) + 0.5, 0.5)
+    counts = {source: np.histogram(values, edges)[0].tolist() for source, values in differences.items()}
+    return {"edges": edges.tolist(), **counts}
+
+
 def by_rmsd(appearance: Appearance, source: str) -> list[int]:
     """Return the patches from the least to the largest rms difference of specular Y from the measured."""
     return ranked([rms(patch) for patch in appearance.specular_errors(source)])
