@@ -32,9 +32,6 @@ def test_text_and_plots(run, folder, tmp_path):
     for file in pictures:
         assert file.read_bytes().startswith(PNG)
         assert str(file) in result.out
-    again = run("evaluate", folder, "--plots", tmp_path / "plots")
-    assert again.code == 2
-    assert "--force" in again.err
 
 
 def test_json(run, folder):
@@ -65,6 +62,14 @@ def test_options_reach_the_evaluation(run, folder, monkeypatch):
     )
     assert asked == [{"as_published": True, "interpolation": "published", "slope_method": "published"}]
     assert "I as published\ninterpolation  published; slope adjustment published\n" in shown.out
+
+
+def test_existing_plots_are_refused_before_any_work(run, tmp_path):
+    (tmp_path / "2023-worst.png").write_bytes(b"mine")
+    result = run("evaluate", tmp_path / "not read", "--plots", tmp_path)
+    assert result.code == 2
+    assert "2023-worst.png" in result.err
+    assert (tmp_path / "2023-worst.png").read_bytes() == b"mine"
 
 
 def test_errors(run, folder, tmp_path):

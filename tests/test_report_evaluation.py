@@ -223,3 +223,19 @@ def test_errors_name_the_folder_and_the_file(print_data, tmp_path):
     (tmp_path / "primaries.csv").write_text("\n".join(kept))
     with pytest.raises(InputError, match=f"^{tmp_path}: primaries: no patch 'CMY'"):
         read_print(tmp_path)
+
+
+def test_missing_readings_are_left_out(print_data, evaluation):
+    tests = print_data.tests
+    XYZ = tests.XYZ.copy()
+    # Of the first patch nothing in the mirror directions, of the second one reading.
+    XYZ[0, tests.theta_i == -tests.theta_r] = np.nan
+    XYZ[1, 0] = np.nan
+    found, _ = table(
+        evaluate_print(replace(print_data, tests=replace(tests, XYZ=XYZ, spectra=None, wavelengths=None))),
+        "Table 1:",
+    )
+    whole, _ = table(evaluation, "Table 1:")
+    ours, before = (np.array(rows["Ward optimised"].ours) for rows in (found, whole))
+    assert np.isfinite(ours).all()
+    assert not np.array_equal(ours, before)

@@ -12,8 +12,9 @@ from iccbrdf.brdf.slopes import SlopeMethod
 from iccbrdf.build import INTERPOLATIONS, SLOPE_METHODS
 from iccbrdf.cli.options import emit, force_option, json_option
 from iccbrdf.errors import UsageError
-from iccbrdf.files import make_folder, write_together
+from iccbrdf.files import check_target, make_folder, write_together
 from iccbrdf.report import evaluate_print, histograms, orderings, read_print, tables
+from iccbrdf.report.plots import PICTURES, plots
 
 EPILOG = """
 \b
@@ -55,6 +56,10 @@ def command(
     """
     if force and pictures is None:
         raise UsageError("--force says that plots may replace files: it needs --plots")
+    if pictures is not None:
+        make_folder(pictures)
+        for name in PICTURES:
+            check_target(pictures / name, overwrite=force)
     data = read_print(folder)
     evaluation = evaluate_print(
         data, as_published=as_published, interpolation=interpolation, slope_method=slope_method
@@ -62,10 +67,7 @@ def command(
     found, claims = tables(evaluation), orderings(evaluation)
     files: dict[Path, bytes] = {}
     if pictures is not None:
-        from iccbrdf.report.plots import plots
-
         files = {pictures / name: data for name, data in plots(evaluation).items()}
-        make_folder(pictures)
         write_together(files, overwrite=force)
     result = {
         "source": data.primaries.source,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +12,7 @@ import numpy as np
 from iccbrdf.brdf.fit_diagnostics import REGIONS
 from iccbrdf.brdf.geometry import Array
 from iccbrdf.report.appearance import MEASURED, Appearance, mean
-from iccbrdf.report.evaluation import INTERPOLATED, OPTIMISED, Evaluation, ModelEvaluation
+from iccbrdf.report.evaluation import INTERPOLATED, MODELS_2020, OPTIMISED, Evaluation
 from iccbrdf.report.tables import MODEL_NAMES, by_rmsd, histograms, ranked
 
 if TYPE_CHECKING:
@@ -25,31 +27,30 @@ _MARGIN = 0.75
 
 
 def plots(evaluation: Evaluation) -> dict[str, bytes]:
-    """
-    Draw an evaluation.
+    """Draw an evaluation: PNG files by name, as in `PICTURES`."""
+    return {name: draw(evaluation) for name, draw in PICTURES.items()}
 
-    Returns
-    -------
-    PNG files by name: for each model of 2020 the test patches with the median and the worst RMSD of specular
-    Y as interpolated, the worst primary and the chromaticities; the patches on slopes with the median and the
-    worst mean CIEDE2000 of AIB; histograms of IB and AIB.
-    """
-    pictures: dict[str, bytes] = {}
-    for model, found in evaluation.models.items():
-        name = MODEL_NAMES[model]
-        tests, primaries = by_rmsd(found.tests, INTERPOLATED), by_rmsd(found.primaries, OPTIMISED)
-        pictures[f"2020-{model}-median.png"] = _panels(found.tests, tests[len(tests) // 2], f"{name}, median")
-        pictures[f"2020-{model}-worst.png"] = _panels(found.tests, tests[-1], f"{name}, worst")
-        pictures[f"2020-{model}-primary-worst.png"] = _panels(
-            found.primaries, primaries[-1], f"{name}, worst primary"
-        )
-        pictures[f"2020-{model}-chromaticity.png"] = _chromaticities(found, name)
-    slopes = evaluation.slopes
-    ordered = ranked([mean(patch) for patch in slopes.differences("AIB")])
-    pictures["2023-median.png"] = _panels(slopes, ordered[len(ordered) // 2], "median of the slopes")
-    pictures["2023-worst.png"] = _panels(slopes, ordered[-1], "worst of the slopes")
-    pictures["2023-histogram.png"] = _histogram(slopes)
-    return pictures
+
+def _test_patch(model: str, which: str, evaluation: Evaluation) -> bytes:
+    """The patch without K whose specular Y, as interpolated, has the median or the worst RMSD."""
+    tests = evaluation.models[model].tests
+    return _panels(tests, _chosen(by_rmsd(tests, INTERPOLATED), which), f"{MODEL_NAMES[model]}, {which}")
+
+
+def _primary(model: str, evaluation: Evaluation) -> bytes:
+    """The primary whose specular Y has the worst RMSD."""
+    primaries = evaluation.models[model].primaries
+    return _panels(primaries, by_rmsd(primaries, OPTIMISED)[-1], f"{MODEL_NAMES[model]}, worst primary")
+
+
+def _slope(which: str, evaluation: Evaluation) -> bytes:
+    """The patch on a slope with the median or the worst mean CIEDE2000 of AIB."""
+    ordered = ranked([mean(patch) for patch in evaluation.slopes.differences("AIB")])
+    return _panels(evaluation.slopes, _chosen(ordered, which), f"{which} of the slopes")
+
+
+def _chosen(ordered: list[int], which: str) -> int:
+    return ordered[-1] if which == "worst" else ordered[len(ordered) // 2]
 
 
 def _panels(appearance: Appearance, patch: int, title: str) -> bytes:
@@ -100,21 +101,22 @@ def _strips(axes: Axes, theta_r: Array, XYZ: Array, white: Array) -> None:
     axes.invert_yaxis()
 
 
-def _chromaticities(found: ModelEvaluation, name: str) -> bytes:
+def _chromaticities(model: str, evaluation: Evaluation) -> bytes:
+    tests, name = evaluation.models[model].tests, MODEL_NAMES[model]
     figure = _figure(8, 4)
     for axes, region in zip(figure.subplots(1, 2), (REGIONS[0], REGIONS[-1]), strict=True):
-        for source, marker in zip((MEASURED, *found.tests.computed), "o+x", strict=True):
-            x, y = found.tests.chromaticity(source, region).T
+        for source, marker in zip((MEASURED, *tests.computed), "o+x", strict=True):
+            x, y = tests.chromaticity(source, region).T
             axes.plot(x, y, marker, fillstyle="none", label=source)
         axes.set(xlabel="x", ylabel="y", title=f"{name}, mean of {region} readings")
     axes.legend()
     return _png(figure)
 
 
-def _histogram(slopes: Appearance) -> bytes:
+def _histogram(evaluation: Evaluation) -> bytes:
     figure = _figure(6, 4)
     axes = figure.subplots()
-    edges, *counts = histograms(slopes).items()
+    edges, *counts = histograms(evaluation.slopes).items()
     for source, values in counts:
         axes.stairs(values, edges[1], label=source)
     axes.set(xlabel="CIEDE2000", ylabel="readings", title="Test patches on slopes")
@@ -137,3 +139,21 @@ def _png(figure: Figure) -> bytes:
     stream = io.BytesIO()
     figure.savefig(stream, format="png", metadata={"Software": None})
     return stream.getvalue()
+
+
+PICTURES: dict[str, Callable[[Evaluation], bytes]] = {
+    **{
+        f"2020-{model}-{what}.png": draw
+        for model in MODELS_2020
+        for what, draw in (
+            ("median", partial(_test_patch, model, "median")),
+            ("worst", partial(_test_patch, model, "worst")),
+            ("primary-worst", partial(_primary, model)),
+            ("chromaticity", partial(_chromaticities, model)),
+        )
+    },
+    "2023-median.png": partial(_slope, "median"),
+    "2023-worst.png": partial(_slope, "worst"),
+    "2023-histogram.png": _histogram,
+}
+"""What is drawn, by the name of the file."""
