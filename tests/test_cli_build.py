@@ -13,7 +13,7 @@ PRIMARIES = folder("profiles") / "fogra39_gloss" / "primaries.json"
 WARD = folder("profiles") / "ward_painting" / "primaries.json"
 SLOPES = PRIMARIES.with_name("slopes.json")
 PAIR = ["mid.icc", "mvis.icc", "mvis.txt"]
-FILES = [*PAIR, "colour-mid.icc", "brdf-link.icc", "colour-mid.txt"]
+FILES = [*PAIR, "colour-mid.icc", "colour-mid.txt"]
 
 
 def samples(channels: int) -> np.ndarray:

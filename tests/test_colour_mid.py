@@ -7,6 +7,7 @@ from dataclasses import replace
 import iccdev
 import numpy as np
 import pytest
+import tifffile
 from conftest import ROOT
 
 import iccbrdf
@@ -18,9 +19,10 @@ from iccbrdf.brdf.models import MODELS
 from iccbrdf.brdf.primaries import Primaries, read_primaries
 from iccbrdf.brdf.slopes import read_slopes, slope_adjust, slope_angle
 from iccbrdf.brdf.smooth_interpolation import SmoothMap
-from iccbrdf.build import build_colour_mid, build_pair
-from iccbrdf.build.profiles import XYZ_RANGE
+from iccbrdf.build import build_colour_mid, build_pair, image_link
+from iccbrdf.build.profiles import NORMAL, XYZ_RANGE
 from iccbrdf.errors import InputError, UsageError
+from iccbrdf.images import Block, create_tiff, open_tiff
 
 FOLDER = ROOT / "profiles" / "fogra39_gloss"
 PRIMARIES = read_primaries(FOLDER / "primaries.json")
@@ -209,7 +211,7 @@ def test_two_steps_equal_one(interpolation):
     """The BRDF image in the binding MID's encoding, then binding MID and MVIS, is the same proof."""
     built, pair = colour_mid(interpolation, "affine"), build_pair(PRIMARIES)
     values = device(colours(2000, 12), normals(2000, 13, steepest=60))
-    to_image = iccbrdf.link([built.mid, built.link])
+    to_image = iccbrdf.link([built.mid, image_link(built.mid)])
     assert to_image.channels_out == iccbrdf.link([pair.mid]).channels_in
     assert to_image.samples_out == "device"
     brdf_image = to_image(values)
@@ -305,3 +307,28 @@ def test_the_flat_print_alone_is_no_slope():
 def test_settings_that_do_not_exist(wrong):
     with pytest.raises(UsageError):
         build_colour_mid(PRIMARIES, **wrong)
+
+
+def test_a_colour_mid_alone_writes_the_brdf_image(run, tmp_path):
+    """On the command line, in 16 bits, for the binding MID."""
+    values = device(colours(600, 16), normals(600, 17, steepest=60)).reshape(20, 30, 6)
+    with create_tiff(tmp_path / "xyzn.tif", 20, 30, ("X", "Y", "Z", *NORMAL), samples="device") as sink:
+        sink.write(Block(0, 0, values))
+    colour = FOLDER / "colour-mid.icc"
+    for dtype in ("float32", "uint16"):
+        image = tmp_path / f"{dtype}.tif"
+        result = run("apply", tmp_path / "xyzn.tif", "-p", colour, "-o", image, "--dtype", dtype)
+        assert (result.code, result.err) == (0, "")
+    two, one = (
+        iccbrdf.link([FOLDER / first, FOLDER / "mvis.icc"])(pixels)
+        for first, pixels in (
+            ("mid.icc", tifffile.imread(tmp_path / "float32.tif")),
+            ("colour-mid.icc", values),
+        )
+    )
+    assert np.abs(two - one).max() < 1e-6
+    with open_tiff(tmp_path / "uint16.tif") as source:
+        assert source.samples == "device"
+        assert source.names == iccbrdf.link([FOLDER / "mid.icc"]).channels_in
+        (block,) = source.blocks()
+    assert np.abs(block.data - brdf_image).max() < 0.51 / 65535

@@ -1,5 +1,6 @@
 """Templates and parameters -> MID and MVIS profiles."""
 
+from iccbrdf.build.brdf_image import image_link
 from iccbrdf.build.colour_mid import (
     INTERPOLATIONS,
     SLOPE_METHODS,
@@ -22,5 +23,6 @@ __all__ = [
     "build_colour_mid",
     "build_pair",
     "build_tables",
+    "image_link",
     "last_slope",
 ]

@@ -1,8 +1,8 @@
 """Primaries and slopes -> the colour MID: from XYZ and normals straight to BRDF parameters.
 
 Its device channels are the XYZ of the flat print, as the ICC's u1.15, and the normal; its calculator
-adjusts XYZ to the slope and interpolates the parameters between the primaries.  A multiplex link takes the
-parameters on to the device channels of the binding MID, so that the BRDF image itself can be written.
+adjusts XYZ to the slope and interpolates the parameters between the primaries.  A private tag holds the
+encoding of the binding MID, so that the BRDF image itself can be written.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from typing import Any
 from iccbrdf.brdf.primaries import Primaries, check_nodes
 from iccbrdf.brdf.slopes import Slopes, published_jumps
 from iccbrdf.brdf.smooth_interpolation import SmoothMap
+from iccbrdf.build.brdf_image import IMAGE_TAG, image_encoding
 from iccbrdf.build.models import MODELS
-from iccbrdf.build.profiles import decoding, encoding, ranges, text_tags
+from iccbrdf.build.profiles import decoding, ranges, text_tags
 from iccbrdf.calc import Compiled, compile_chain
 from iccbrdf.calc import listing as program_listing
 from iccbrdf.errors import InputError, UsageError, nearest
@@ -31,10 +32,9 @@ SLOPES_TAG = "slop"
 
 @dataclass(frozen=True)
 class ColourMid:
-    """A colour MID, the link from its multiplex channels to a binding MID's device, and a listing."""
+    """A colour MID and its listing."""
 
     mid: Profile
-    link: Profile
     listing: str
     compiled: Compiled
 
@@ -43,7 +43,6 @@ class ColourMid:
         """What is written to a folder, by file name."""
         return {
             "colour-mid.icc": self.mid.to_bytes(),
-            "brdf-link.icc": self.link.to_bytes(),
             "colour-mid.txt": self.listing.encode(),
         }
 
@@ -106,8 +105,7 @@ def build_colour_mid(
     adjustment = f"{slope_method} slope adjustment" if slopes is not None else "no slope adjustment"
     title = f"{MODELS[primaries.model].title}, {interpolation} interpolation, {adjustment}"
     return ColourMid(
-        mid=_mid(compiled, title, slopes),
-        link=_link(compiled.outputs, primaries, MODELS[primaries.model].title),
+        mid=_mid(compiled, title, primaries, slopes),
         listing="\n".join(_lines(compiled, title, slopes)) + "\n",
         compiled=compiled,
     )
@@ -148,7 +146,7 @@ def _nodes(primaries: Primaries, interpolation: str, p: float, exponent: float) 
     }
 
 
-def _mid(compiled: Compiled, title: str, slopes: Slopes | None) -> Profile:
+def _mid(compiled: Compiled, title: str, primaries: Primaries, slopes: Slopes | None) -> Profile:
     """Device -> real by a matrix, real -> parameters by the program."""
     n_in, n_out = len(compiled.inputs), len(compiled.outputs)
     decode = decoding(ranges(compiled.inputs, {}))
@@ -158,25 +156,11 @@ def _mid(compiled: Compiled, title: str, slopes: Slopes | None) -> Profile:
         **text_tags(f"Colour MID for {title}", compiled.outputs),
         "clrt": ColorantTable.of(compiled.inputs),
         "A2M0": MultiProcess(n_in, n_out, (decode, program)),
+        IMAGE_TAG: image_encoding(compiled.outputs, primaries),
     }
     if slopes is not None:
         tags[SLOPES_TAG] = NumberArray("fl32", slopes.angles)
     return Profile(header, tags)
-
-
-def _link(channels: tuple[str, ...], primaries: Primaries, title: str) -> Profile:
-    """Multiplex channels -> the device channels of the binding MID."""
-    n = len(channels)
-    encode = encoding(ranges(channels, primaries.encoding))
-    header = Header(device_class="mlnk", colour_space=f"nc{n:04x}", mcs=f"mc{n:04x}")
-    return Profile(
-        header,
-        {
-            **text_tags(f"BRDF image of {title}", channels),
-            "clrt": ColorantTable.of(channels),
-            "M2A0": MultiProcess(n, n, (encode,)),
-        },
-    )
 
 
 def _lines(compiled: Compiled, title: str, slopes: Slopes | None) -> Iterator[str]:

@@ -22,6 +22,7 @@ from iccbrdf.brdf.interpolation import InterpolationMethod, interpolate
 from iccbrdf.brdf.models import find_model
 from iccbrdf.brdf.primaries import Primaries
 from iccbrdf.brdf.smooth_interpolation import DIFFUSE, GLOSS, GLOSS_FLOOR, KNEE
+from iccbrdf.build.brdf_image import IMAGE_TAG, image_encoding
 from iccbrdf.build.models import MODELS
 from iccbrdf.build.power import Power, cube, near_exponential, quantised, root
 from iccbrdf.build.profiles import COPYRIGHT, NORMAL, decoding, ranges, text_tags
@@ -147,6 +148,7 @@ def build_table_mid(
         {
             **text_tags(f"Colour MID for {_title(primaries, method, grid)}", channels_out),
             "clrt": ColorantTable.of(channels_in),
+            IMAGE_TAG: image_encoding(channels_out, primaries),
             "A2M0": MultiProcess.of(decoding(ranges(channels_in, {})), calculator),
         },
     )

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import click
 
-from iccbrdf.build import last_slope
+from iccbrdf.build import image_link, last_slope
 from iccbrdf.cli.options import emit, environment, force_option, json_option, name_list, scene_options
 from iccbrdf.cli.pipeline import Output, arranged_channels, check_outputs, run
 from iccbrdf.cmm import INTENTS, link
@@ -21,7 +21,7 @@ Examples:
     iccbrdf apply relief.tif -p mid.icc -p mvis.icc -o proof.png -o xyz.tif --light 60,0
   From the XYZ of the flat print and normals, and the BRDF image on the way:
     iccbrdf apply xyzn.tif -p colour-mid.icc -p mvis.icc -o proof.png
-    iccbrdf apply xyzn.tif -p colour-mid.icc -p brdf-link.icc -o brdf.tif --dtype uint16
+    iccbrdf apply xyzn.tif -p colour-mid.icc -o brdf.tif --dtype uint16
   Channels by name, for a TIFF from elsewhere:
     iccbrdf apply maps.tif -p mid.icc -p mvis.icc -o xyz.tif \\
       --channels kd.X,kd.Y,kd.Z,ks.X,ks.Y,ks.Z,m
@@ -76,10 +76,14 @@ def command(
     """Map IMAGE, a TIFF, through a chain of profiles.
 
     The image holds the channels of the first profile, each encoded in 0..1, or their real values: for a MID
-    of `iccbrdf build` the BRDF parameters and the normal, for a colour MID XYZ and the normal.
+    of `iccbrdf build` the BRDF parameters and the normal, for a colour MID XYZ and the normal.  A colour MID
+    alone writes the BRDF image, encoded for the binding MID.
     """
     chain = [read_profile(path) for path in profiles]
     last = chain[-1]
+    to_image = image_link(last) if len(chain) == 1 else None
+    if to_image is not None:
+        chain.append(to_image)
     embedded = last.to_bytes() if embed else None
     targets = [Output(path, dtype, embedded, exposure, 16 if depth == "16" else 8) for path in outputs]
     check_outputs(targets, overwrite=force)

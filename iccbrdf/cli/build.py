@@ -76,8 +76,7 @@ def command(
     \b
     mid.icc         the binding MID: a BRDF image, each parameter in 0..1
     mvis.icc        the MVIS: the model, light and view
-    colour-mid.icc  the colour MID: XYZ of the flat print and normals
-    brdf-link.icc   after the colour MID: the BRDF image for the binding MID
+    colour-mid.icc  the colour MID: XYZ of the flat print and normals; alone it gives the BRDF image
     table-mid.icc   with --table: the colour MID, without slopes, as a table
     table-v4.icc    with --table: the same for systems of ICC version 4, XYZ to parameters
     *.txt           listings of their programs, errors of the tables

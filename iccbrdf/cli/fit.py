@@ -30,7 +30,8 @@ from iccbrdf.measure import (
 EPILOG = """
 \b
 Examples:
-  iccbrdf simulate -o print && iccbrdf fit print/primaries.csv -o primaries.json
+  iccbrdf simulate -o print
+  iccbrdf fit print/primaries.csv -o primaries.json
   A table that does not say what its numbers are:
     iccbrdf fit table.csv -o primaries.json -d angles=degree -d view_angles=lamp \\
       -d quantity=reflectance -d scale=100 -d illuminant=D50 \\
