@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from iccbrdf.errors import (
     IccBrdfError,
+    IccBrdfWarning,
     InputError,
+    InputWarning,
     LimitError,
     LinkError,
     ProfileError,
@@ -40,7 +42,9 @@ _LAZY = {
 
 __all__ = [
     "IccBrdfError",
+    "IccBrdfWarning",
     "InputError",
+    "InputWarning",
     "LimitError",
     "LinkError",
     "Profile",

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from iccbrdf.brdf.models import MODELS
+from iccbrdf.brdf.models import MODELS, NORMAL
 from iccbrdf.brdf.primaries import Primaries
-from iccbrdf.build.profiles import NORMAL, XYZ_RANGE
+from iccbrdf.build.profiles import XYZ_RANGE
 from iccbrdf.images.normals import height_to_normals
 
 PRINT_WIDTH = 200.0

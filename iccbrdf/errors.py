@@ -59,7 +59,15 @@ class LimitError(IccBrdfError):
     exit_code = 4
 
 
-class ProfileWarning(UserWarning):
+class IccBrdfWarning(UserWarning):
+    """Base of all warnings of this package."""
+
+
+class InputWarning(IccBrdfWarning):
+    """User data is odd in a way that does not hinder its use."""
+
+
+class ProfileWarning(IccBrdfWarning):
     """A profile deviates from the specification in a way that does not hinder its use."""
 
 

@@ -15,12 +15,12 @@ from iccbrdf.brdf import smooth_interpolation
 from iccbrdf.brdf.colour_difference import XYZ_to_Lab, delta_E_CIE2000
 from iccbrdf.brdf.geometry import direction
 from iccbrdf.brdf.interpolation import interpolate
-from iccbrdf.brdf.models import MODELS
+from iccbrdf.brdf.models import MODELS, NORMAL
 from iccbrdf.brdf.primaries import Primaries, read_primaries
 from iccbrdf.brdf.slopes import read_slopes, slope_adjust, slope_angle
 from iccbrdf.brdf.smooth_interpolation import SmoothMap
 from iccbrdf.build import build_colour_mid, build_pair, image_link
-from iccbrdf.build.profiles import NORMAL, XYZ_RANGE
+from iccbrdf.build.profiles import XYZ_RANGE
 from iccbrdf.errors import InputError, UsageError
 from iccbrdf.images import Block, create_tiff, open_tiff
 

@@ -14,6 +14,9 @@ from iccbrdf.brdf.geometry import Array
 from iccbrdf.brdf.ward import ward
 from iccbrdf.errors import UsageError, nearest
 
+NORMAL = ("n.x", "n.y", "n.z")
+"""Channels of the normal, which follow those of a model's parameters."""
+
 
 @dataclass(frozen=True)
 class Model:

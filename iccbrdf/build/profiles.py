@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from iccbrdf.brdf.models import NORMAL
 from iccbrdf.icc import Matrix, Mluc, TagArray
 
 COPYRIGHT = "No copyright, use freely"
@@ -14,7 +15,6 @@ COPYRIGHT = "No copyright, use freely"
 Range = tuple[float, float]
 """What the device values 0 and 1 of a channel stand for."""
 
-NORMAL = ("n.x", "n.y", "n.z")
 _NORMAL_RANGE = (-1.0, 1.0)
 XYZ_RANGE = (0.0, 65535 / 32768)
 """u1.15: the largest 16-bit integer is almost 2."""

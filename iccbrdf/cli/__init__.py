@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from iccbrdf.errors import IccBrdfError, InputError, ProfileWarning, UsageError, nearest
+from iccbrdf.errors import IccBrdfError, IccBrdfWarning, InputError, UsageError, nearest
 
 COMMANDS = {
     "simulate": "Simulate goniometric measurements of a print.",
@@ -112,5 +112,5 @@ def _failed(message: str, code: int, as_json: bool) -> int:
 
 
 def _show_warning(message: Any, category: type[Warning], *args: Any, **kwargs: Any) -> None:
-    if issubclass(category, ProfileWarning):
+    if issubclass(category, IccBrdfWarning):
         click.echo(f"iccbrdf: warning: {message}", err=True)

@@ -11,8 +11,11 @@ from iccbrdf.build import image_link, last_slope
 from iccbrdf.cli.options import emit, environment, force_option, json_option, name_list, scene_options
 from iccbrdf.cli.pipeline import Output, arranged_channels, check_outputs, run
 from iccbrdf.cmm import INTENTS, link
+from iccbrdf.errors import UsageError
 from iccbrdf.icc import read_profile
-from iccbrdf.images import Samples, open_tiff
+from iccbrdf.images import ImageSource, Samples, WithNormals, open_tiff
+from iccbrdf.images.blocks import Array
+from iccbrdf.images.normals import height_to_normals, read_height_map, read_normal_map
 
 EPILOG = """
 \b
@@ -22,10 +25,32 @@ Examples:
   From the XYZ of the flat print and normals, and the BRDF image on the way:
     iccbrdf apply xyzn.tif -p colour-mid.icc -p mvis.icc -o proof.png
     iccbrdf apply xyzn.tif -p colour-mid.icc -o brdf.tif --dtype uint16
+  XYZ of the flat print and a height map:
+    iccbrdf apply xyz.tif -p colour-mid.icc -p mvis.icc -o proof.png \\
+      --height relief.png --relief 2 --pixel-pitch 0.1
   Channels by name, for a TIFF from elsewhere:
     iccbrdf apply maps.tif -p mid.icc -p mvis.icc -o xyz.tif \\
       --channels kd.X,kd.Y,kd.Z,ks.X,ks.Y,ks.Z,m
 """
+
+
+def read_relief(
+    normal_map: Path | None,
+    green: str,
+    height_map: Path | None,
+    relief: float | None,
+    pitch: float | None,
+) -> Array | None:
+    """Normals from one of the two kinds of maps, or None where neither is given."""
+    if normal_map is not None and height_map is not None:
+        raise UsageError("--normals and --height are two ways to say one thing: give one of them")
+    if (height_map is None) != (relief is None) or (height_map is None) != (pitch is None):
+        raise UsageError("--height, --relief and --pixel-pitch belong together")
+    if normal_map is not None:
+        return read_normal_map(normal_map, "opengl" if green == "up" else "directx")
+    if height_map is None or relief is None or pitch is None:
+        return None
+    return height_to_normals(read_height_map(height_map, relief), pitch)
 
 
 @click.command("apply", epilog=EPILOG)
@@ -42,6 +67,16 @@ Examples:
               "ones (signed normals, physical parameters).")  # fmt: skip
 @click.option("--channels", metavar="NAMES", help="Names of the image's channels, separated by commas, where "
               "it does not say them itself.  A channel left out takes the default of the MVIS.")  # fmt: skip
+@click.option("--normals", "normal_map", type=click.Path(path_type=Path),
+              help="A normal map (PNG or TIFF) of the image's size: its channels n.x, n.y, n.z.")  # fmt: skip
+@click.option("--green", type=click.Choice(("up", "down")), default="up", show_default=True,
+              help="Which way green points in the normal map: up (OpenGL) or down (DirectX).")  # fmt: skip
+@click.option("--height", "height_map", type=click.Path(path_type=Path),
+              help="A height map (PNG or TIFF) of the image's size, white on top, instead.")  # fmt: skip
+@click.option("--relief", type=click.FloatRange(min=0, min_open=True), metavar="LENGTH",
+              help="Height of white (of 1, in a float file) above black, such as 2 (mm).")  # fmt: skip
+@click.option("--pixel-pitch", "pitch", type=click.FloatRange(min=0, min_open=True), metavar="LENGTH",
+              help="Distance of the height map's pixels on the print, in the same unit.")  # fmt: skip
 @click.option("--dtype", type=click.Choice(("float32", "uint16")), default="float32", show_default=True,
               help="Samples of a TIFF; uint16 holds XYZ as the ICC's u1.15.")  # fmt: skip
 @click.option("--embed", is_flag=True, help="Embed the last profile in a TIFF.")
@@ -64,6 +99,11 @@ def command(
     intent: str,
     samples: Samples | None,
     channels: str | None,
+    normal_map: Path | None,
+    green: str,
+    height_map: Path | None,
+    relief: float | None,
+    pitch: float | None,
     dtype: Literal["float32", "uint16"],
     embed: bool,
     exposure: float,
@@ -88,7 +128,15 @@ def command(
     targets = [Output(path, dtype, embedded, exposure, 16 if depth == "16" else 8) for path in outputs]
     check_outputs(targets, overwrite=force)
     variables = environment(light, view, env)
-    with open_tiff(image, samples) as source:
+    normals = read_relief(normal_map, green, height_map, relief, pitch)
+    with open_tiff(image, samples) as tiff:
+        declared = name_list(channels) if channels is not None else None
+        source: ImageSource = tiff
+        if normals is not None:
+            own = declared or tiff.names
+            if own is None or len(own) != tiff.channels:
+                raise UsageError(f"name the image's {tiff.channels} channels with --channels")
+            source, declared = WithNormals(tiff, own, normals), None
         settings: dict[str, Any] = {
             "env": variables,
             "intent": intent,
@@ -97,7 +145,6 @@ def command(
             "samples": source.samples,
         }
         transform = link(chain, **settings)
-        declared = name_list(channels) if channels is not None else None
         names = arranged_channels(source, transform.channels_in, declared)
         if names is not None:
             transform = link(chain, channels=names, **settings)

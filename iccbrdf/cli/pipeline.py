@@ -12,13 +12,13 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from iccbrdf.brdf.models import NORMAL
 from iccbrdf.brdf.slopes import slope_angle
-from iccbrdf.build.profiles import NORMAL
 from iccbrdf.cmm import Transform, standard_XYZ
 from iccbrdf.errors import UsageError, nearest
 from iccbrdf.files import check_target
 from iccbrdf.icc import Profile
-from iccbrdf.images import Block, TiffSource, create_tiff
+from iccbrdf.images import Block, ImageSource, create_tiff
 from iccbrdf.images.display import create_png
 
 TIFF_SUFFIXES = (".tif", ".tiff")
@@ -75,7 +75,7 @@ def check_outputs(outputs: Sequence[Output], *, overwrite: bool) -> None:
 
 
 def run(
-    source: TiffSource,
+    source: ImageSource,
     transform: Transform,
     last: Profile,
     outputs: Sequence[Output],
@@ -128,7 +128,7 @@ def _steeper(data: npt.NDArray[Any], samples: str, names: Sequence[str], limit: 
     return int(np.count_nonzero(angles > limit + 1e-3))
 
 
-def _open(output: Output, source: TiffSource, transform: Transform, overwrite: bool) -> Any:
+def _open(output: Output, source: ImageSource, transform: Transform, overwrite: bool) -> Any:
     if output.is_png:
         return create_png(
             output.path,
@@ -150,7 +150,7 @@ def _open(output: Output, source: TiffSource, transform: Transform, overwrite: b
     )
 
 
-def _progress(source: TiffSource, label: str) -> Iterable[Block]:
+def _progress(source: ImageSource, label: str) -> Iterable[Block]:
     """The blocks of `source`, with a progress bar where stderr is a terminal."""
     if not sys.stderr.isatty():
         yield from source.blocks()
@@ -168,7 +168,7 @@ def _progress(source: TiffSource, label: str) -> Iterable[Block]:
 
 
 def arranged_channels(
-    source: TiffSource, own: Sequence[str], declared: Sequence[str] | None
+    source: ImageSource, own: Sequence[str], declared: Sequence[str] | None
 ) -> Sequence[str] | None:
     """The names to link by: those declared, else those in the file; None where there are neither.
 

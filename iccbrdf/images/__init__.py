@@ -7,13 +7,16 @@ from iccbrdf.images.pictures import read_picture
 from iccbrdf.images.record import Samples
 from iccbrdf.images.tiff_reader import TiffSource, open_tiff
 from iccbrdf.images.tiff_writer import TiffSink, create_tiff
+from iccbrdf.images.with_normals import ImageSource, WithNormals
 
 __all__ = [
     "Block",
+    "ImageSource",
     "PngSink",
     "Samples",
     "TiffSink",
     "TiffSource",
+    "WithNormals",
     "create_png",
     "create_tiff",
     "height_to_normals",

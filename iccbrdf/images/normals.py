@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from iccbrdf.errors import InputError, UsageError, nearest
+from iccbrdf.errors import InputError, InputWarning, UsageError, nearest
 from iccbrdf.files import StrPath
 from iccbrdf.images.blocks import Array
 from iccbrdf.images.pictures import read_picture
@@ -37,7 +37,7 @@ def read_normal_map(path: StrPath, convention: Convention = "opengl") -> Array:
 
     Warns
     -----
-    UserWarning
+    InputWarning
         Pixels without a direction (vectors shorter than 0.02) are taken as flat: how many there are.
 
     Raises
@@ -65,7 +65,9 @@ def read_normal_map(path: StrPath, convention: Convention = "opengl") -> Array:
     shapeless = length[:, :, 0] < _SHORTEST
     if shapeless.any():
         count = np.count_nonzero(shapeless)
-        warnings.warn(f"{path}: {count} pixels without a direction are taken as flat", stacklevel=2)
+        warnings.warn(
+            f"{path}: {count} pixels without a direction are taken as flat", InputWarning, stacklevel=2
+        )
         normals[shapeless] = 0, 0, 1
         length[shapeless] = 1
     normals /= length

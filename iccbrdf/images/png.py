@@ -36,9 +36,7 @@ class PngWriter:
         The ICC profile to embed.
     """
 
-    def __init__(
-        self, file: BinaryIO, height: int, width: int, dtype: np.dtype[Any], profile: bytes
-    ) -> None:
+    def __init__(self, file: BinaryIO, height: int, width: int, dtype: np.dtype[Any], profile: bytes) -> None:
         self._file = file
         self._pixel_bytes = 3 * dtype.itemsize
         self._compressor = zlib.compressobj()
