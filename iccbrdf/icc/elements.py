@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from iccbrdf.calc.program import Program, decode_ops, encode_ops
+from iccbrdf.errors import ProfileWarning
 from iccbrdf.icc.fields import (
     SIGNATURE,
     U16,
@@ -283,6 +285,12 @@ class _FunctionAndElements(FieldType):
         needed = 12 + 8 * int.from_bytes(reader.peek(offset + 8, 4, "main function"), "big")
         if stated < needed:
             raise reader.error(f"main function: found size {stated}, expected {needed}", at=offset)
+        if stated > needed:
+            warnings.warn(
+                f"{reader.where}: main function: found size {stated}, it takes {needed}",
+                ProfileWarning,
+                stacklevel=2,
+            )
         return tuple(reader.parts([(offset, needed), *spans[1:]], self._label, self._part))
 
     @staticmethod
