@@ -210,10 +210,12 @@ def _primaries(measured: Measurements, result: FitResult) -> Primaries:
     for p, name in enumerate(measured.patches):
         XYZ = measured.XYZ[p, row]
         if not np.all(XYZ > 0):
-            raise InputError(f"{name}: XYZ at {geometry} is {XYZ.tolist()}, expected numbers above 0")
+            raise InputError(f"{measured.source}: {name}: XYZ at {geometry} is {XYZ.tolist()}, expected numbers above 0")
         cmyk = None if measured.cmyk is None else tuple(measured.cmyk[p].tolist())
         entries.append(Primary(name, _rounded(XYZ), _rounded(result.parameters[p]), cmyk))
-    largest = [float(family.max()) for family in model.split(result.parameters)]
+    # A parameter at its bound is the bound once rounded, and may lie beyond it by a last digit before.
+    rounded = np.array([entry.parameters for entry in entries])
+    largest = [float(family.max()) for family in model.split(rounded)]
     encoding = {
         family: next(scale for scale in _SCALES if peak <= scale)
         for (family, _), peak in zip(model.parameters, largest, strict=True)

@@ -58,10 +58,13 @@ class PrintData:
         at_45_0(table)
         if not np.any(regions(table.light, table.view) == REGIONS.index("specular")):
             raise InputError("found no readings in a mirror direction, expected some")
-        if not np.allclose(table.white, self.colours.white, atol=_SAME_WHITE):
+        found, expected = (
+            (each.illuminant, each.observer, tuple(each.white)) for each in (table, self.colours)
+        )
+        if found[:2] != expected[:2] or not np.allclose(found[2], expected[2], atol=_SAME_WHITE):
             raise InputError(
-                f"found {table.illuminant}, {table.observer}, expected {self.colours.illuminant}, "
-                f"{self.colours.observer} as in the slopes file"
+                f"found {found[0]}, {found[1]}, white {found[2]}, expected {expected[0]}, {expected[1]}, "
+                f"white {expected[2]} as in the slopes file"
             )
 
     @property
