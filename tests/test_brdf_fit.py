@@ -242,7 +242,8 @@ def test_names_that_do_not_exist():
     assert "did you mean 'rms CIEDE2000'" in refused(objective="rms CIEDE200")
     assert "did you mean 'nelder_mead'" in refused(solver="nelder-mead")
     assert "ward has no refractive index" in refused(model="ward", refractive_index="free")
-    assert "expected at least 1" in refused(refractive_index=0.9)
+    for index in (0.9, np.inf, np.nan):
+        assert "expected a finite number from 1" in refused(refractive_index=index)
 
 
 def test_arrays_that_do_not_go_together():

@@ -131,6 +131,15 @@ def test_geometry_nearest_to_the_standard_and_scales(run, tmp_path):
     assert primaries.encoding == {"kd": 1.25, "ks": 2, "m": 1}
 
 
+def test_parameters_at_their_bounds_make_a_file(run, tmp_path):
+    table = write_table(tmp_path / "table.csv", {"Mirror": [*BRDF1[:3], 40, 40, 40, 0.25]})
+    result = run("fit", table, "-o", tmp_path / "p.json", *DECLARED)
+    assert result.code == 0
+    assert "FLAG at a bound" in result.out
+    primaries = read_primaries(tmp_path / "p.json")
+    assert (primaries.parameters[0, 4], primaries.encoding["ks"]) == (10, 10)
+
+
 def test_what_is_left_out_is_reported(run, tmp_path):
     rows = write_table(tmp_path / "flat.csv", {"White": BRDF1}, [*THETAS, (75, 0), (30, -72)]).read_text()
     head, *lines = rows.splitlines()
@@ -149,6 +158,9 @@ def test_errors(run, table, tmp_path):
     assert (undeclared.code, "is not declared" in undeclared.err) == (3, True)
     unknown = run("fit", table, "-o", output, "--patches", "Whit", *DECLARED)
     assert (unknown.code, "did you mean 'White'?" in unknown.err) == (2, True)
+    for option in ("--max-angle", "--repeat-scatter"):
+        endless = run("fit", table, "-o", output, option, "nan", *DECLARED)
+        assert (endless.code, "not a finite number" in endless.err) == (2, True)
     few = write_table(tmp_path / "few.csv", {"White": BRDF1}, THETAS[:7])
     refused = run("fit", few, "-o", output, *DECLARED)
     assert (refused.code, "patch White was measured in 7 geometries" in refused.err) == (3, True)

@@ -69,7 +69,10 @@ def test_nothing_is_overwritten(run, tmp_path):
 
 
 def test_options_out_of_range(run, tmp_path):
-    for option, value in (("--lamp-exclusion", 10), ("--noise", -1), ("--seed", -1), ("--observer", 5)):
+    for option, value in (
+        ("--lamp-exclusion", 10), ("--noise", -1), ("--seed", -1), ("--observer", 5),
+        ("--noise", "nan"), ("--aperture", "nan"), ("--scatter", "nan"),
+    ):  # fmt: skip
         result = run("simulate", "-o", tmp_path, option, value)
         assert result.code == 2
         assert option in result.err

@@ -204,7 +204,9 @@ def _problem(
         if not entry.has_fresnel:
             raise UsageError(f"{model} has no refractive index to be fitted")
     elif not 1 <= refractive_index < np.inf:
-        raise UsageError(f"the refractive index is {refractive_index}, expected a finite number from 1, or 'free'")
+        raise UsageError(
+            f"the refractive index is {refractive_index}, expected a finite number from 1, or 'free'"
+        )
     XYZ, white = np.asarray(XYZ, dtype=np.float64), np.asarray(white, dtype=np.float64)
     light, view = unit(light), unit(view)
     if light.ndim != 2 or view.shape != light.shape:

@@ -15,7 +15,7 @@ from iccbrdf.brdf.fit_problem import Objective
 from iccbrdf.brdf.geometry import Array
 from iccbrdf.brdf.models import MODELS
 from iccbrdf.brdf.primaries import REFRACTIVE_INDEX, Primaries, Primary, write_primaries
-from iccbrdf.cli.options import emit, force_option, json_option, name_list
+from iccbrdf.cli.options import FiniteRange, emit, force_option, json_option, name_list
 from iccbrdf.errors import InputError, UsageError, nearest
 from iccbrdf.files import check_target
 from iccbrdf.measure import (
@@ -59,7 +59,7 @@ _DIGITS = 7
               help="What the table's numbers are; repeatable.")  # fmt: skip
 @click.option("--declarations", type=click.Path(path_type=Path), help="The same in a TOML file.")
 @click.option("--patches", metavar="NAMES", help="Fit these patches only, separated by commas.")
-@click.option("--max-angle", type=click.FloatRange(0, 90, min_open=True, max_open=True),
+@click.option("--max-angle", type=FiniteRange(0, 90, min_open=True, max_open=True),
               default=_MAX_ANGLE, show_default=True,
               help="Leave out geometries further from the normal, in degrees.")  # fmt: skip
 @click.option("--model", type=click.Choice(list(MODELS)), default="brdf1", show_default=True)
@@ -75,7 +75,7 @@ _DIGITS = 7
 @click.option("--as-published", is_flag=True,
               help="Compare the model's I, cosine included, with the measured reflectance, as the papers "
               "do; by default the same quantity of both.")  # fmt: skip
-@click.option("--repeat-scatter", type=click.FloatRange(0), default=0.0, metavar="DE",
+@click.option("--repeat-scatter", type=FiniteRange(0), default=0.0, metavar="DE",
               help="Root mean square CIEDE2000 between repeated readings, taken off the lack of "
               "fit.")  # fmt: skip
 @click.option("--strict", is_flag=True, help="Exit with 1 where a fit must not be trusted.")
@@ -210,7 +210,9 @@ def _primaries(measured: Measurements, result: FitResult) -> Primaries:
     for p, name in enumerate(measured.patches):
         XYZ = measured.XYZ[p, row]
         if not np.all(XYZ > 0):
-            raise InputError(f"{measured.source}: {name}: XYZ at {geometry} is {XYZ.tolist()}, expected numbers above 0")
+            raise InputError(
+                f"{measured.source}: {name}: XYZ at {geometry} is {XYZ.tolist()}, expected numbers above 0"
+            )
         cmyk = None if measured.cmyk is None else tuple(measured.cmyk[p].tolist())
         entries.append(Primary(name, _rounded(XYZ), _rounded(result.parameters[p]), cmyk))
     # A parameter at its bound is the bound once rounded, and may lie beyond it by a last digit before.

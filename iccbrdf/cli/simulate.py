@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from iccbrdf.brdf.primaries import ILLUMINANTS, OBSERVERS
-from iccbrdf.cli.options import emit, force_option, json_option
+from iccbrdf.cli.options import FiniteRange, emit, force_option, json_option
 from iccbrdf.files import check_target, make_folder
 from iccbrdf.measure import report
 from iccbrdf.measure.fogra39 import ILLUMINANT, OBSERVER
@@ -32,11 +32,11 @@ Examples:
               help="Folder for the files; made if need be.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True,
               help="Draws the print and the noise.")  # fmt: skip
-@click.option("--noise", type=click.FloatRange(0, 1), default=Sensor.noise, show_default=True,
+@click.option("--noise", type=FiniteRange(0, 1), default=Sensor.noise, show_default=True,
               help="Of a reading: standard deviation, relative.")  # fmt: skip
-@click.option("--aperture", type=click.FloatRange(0, 5), default=Sensor.aperture, show_default=True,
+@click.option("--aperture", type=FiniteRange(0, 5), default=Sensor.aperture, show_default=True,
               help="Half angle in degrees that the sensor averages over.")  # fmt: skip
-@click.option("--scatter", type=click.FloatRange(0, 1), default=0.01, show_default=True,
+@click.option("--scatter", type=FiniteRange(0, 1), default=0.01, show_default=True,
               help="Of the patches' film thickness and roughness: standard deviation, relative.")  # fmt: skip
 @click.option("--lamp-exclusion", type=click.Choice([str(angle) for angle in LAMP_EXCLUSIONS]),
               default=str(LAMP_EXCLUSIONS[0]), show_default=True,
