@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import math
+import re
 
 import colour
 import numpy as np
@@ -341,3 +342,32 @@ def test_wrong_options_are_named(options, message) -> None:
     assert message in str(caught.value)
     with pytest.raises(UsageError, match=r"XYZ has the shape \(4,\)"):
         interpolate([0.3, 0.3, 0.3, 0.3], fogra39())
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_published_fits_of_other_materials_as_nodes(method, shared_data) -> None:
+    # Cook-Torrance parameters of MERL materials by Ngan, Durand and Matusik, 2005.  G and B lack MERL's
+    # channel scales; linear sRGB for want of better.
+    lines = (shared_data / "published-fits" / "ngan_cooktorrance.fit").read_text().splitlines()
+    fits = np.array([re.findall(r"\d+\.?\d*(?:e[-+]?\d+)?", line.split("=", 1)[1])
+                     for line in lines if "=" in line], dtype=float)  # fmt: skip
+    scaled = fits[:, :6].reshape(-1, 2, 3) * [1, 1.15, 1.66]
+    sRGB = colour.RGB_COLOURSPACES["sRGB"].matrix_RGB_to_XYZ
+    (kd, ks), m = np.moveaxis(scaled @ sRGB.T, 1, 0), fits[:, -1]
+    sound = np.flatnonzero((kd > 1e-3).all(axis=1) & (ks > 1e-3).all(axis=1))
+    assert sound.size > 40
+    parameters = np.concatenate([kd, ks, m[:, np.newaxis]], axis=1)
+    # Each twelfth from the darkest on, so that the nodes span the lightness.
+    nodes = sound[np.argsort(kd[sound, 1])][:: max(1, sound.size // 12)][:16]
+    primaries = with_entries(
+        [Primary(f"P{k}", tuple(kd[k].tolist()), tuple(parameters[k].tolist())) for k in nodes]
+    )
+    np.testing.assert_allclose(interpolate(kd[nodes], primaries, method=method), parameters[nodes], rtol=1e-9)
+    others = np.setdiff1d(sound, nodes)
+    between = interpolate(kd[others], primaries, method=method)
+    assert np.isfinite(between).all()
+    assert (between[:, 3:] > 0).all()
+    # What one cannot know of another material stays near what the nodes have.
+    span = np.log(parameters[nodes, 6])
+    assert np.log(between[:, 6]).min() > span.min() - np.ptp(span) / 2
+    assert np.log(between[:, 6]).max() < span.max() + np.ptp(span) / 2
