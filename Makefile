@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: demo test lint types profiles figures clean
+.PHONY: demo test lint types profiles figures bench clean
 
 # The environment is remade when the dependencies change.
 $(VENV)/installed: pyproject.toml
@@ -30,6 +30,10 @@ profiles: $(VENV)/installed
 figures: demo
 	$(BIN)/python tools/make_figures.py
 	$(BIN)/python tools/report_colour_mid.py
+
+# Ratios only: absolute times are those of the machine.  Minutes.
+bench: $(VENV)/installed
+	$(BIN)/python tools/bench_fit.py
 
 clean:
 	rm -rf $(VENV) demo build *.egg-info .mypy_cache .ruff_cache .pytest_cache
