@@ -16,10 +16,10 @@ import numpy as np
 from iccbrdf.brdf.fit import fit
 from iccbrdf.brdf.fit_diagnostics import REGIONS
 from iccbrdf.brdf.interpolation import interpolate
-from iccbrdf.brdf.primaries import Primaries, Primary
 from iccbrdf.build import INTERPOLATIONS
 from iccbrdf.measure.simulation import simulate
 from iccbrdf.report.appearance import Appearance, predict
+from iccbrdf.report.evaluation import fitted_primaries
 from iccbrdf.report.print_data import at_45_0
 
 
@@ -28,16 +28,7 @@ def errors(seed: int) -> np.ndarray:
     simulated = simulate(seed)
     nodes, tests = simulated.primaries, simulated.tests
     parameters = fit(nodes.XYZ, nodes.light, nodes.view, nodes.white, patches=nodes.patches).parameters
-    entries = zip(nodes.patches, at_45_0(nodes).tolist(), parameters.tolist(), strict=True)
-    primaries = Primaries(
-        model="brdf1",
-        illuminant=nodes.illuminant,
-        observer=nodes.observer,
-        white=nodes.white,
-        geometry="45:0",
-        source=nodes.source,
-        primaries=tuple(Primary(name, tuple(XYZ), tuple(values)) for name, XYZ, values in entries),
-    )
+    primaries = fitted_primaries(nodes, "brdf1", parameters)
     XYZ = at_45_0(tests)
     computed = {
         method: predict("brdf1", interpolate(XYZ, primaries, method=method), tests, as_published=False)

@@ -119,7 +119,7 @@ def evaluate_print(
         name: predict(FITS_2023[name][0], parameters, nodes, as_published=as_published)
         for name, parameters in fits.items()
     }
-    primaries = _primaries(nodes, "brdf1", fits["BRDF1 CD"])
+    primaries = fitted_primaries(nodes, "brdf1", fits["BRDF1 CD"])
     slopes = _on_slopes(data, primaries, interpolation, slope_method, as_published)
     return Evaluation(
         models={model: _evaluate_2020(data, model, interpolation, as_published) for model in MODELS_2020},
@@ -136,9 +136,10 @@ def _evaluate_2020(
     nodes = data.primaries.select(rows(data.primaries, NODES_2020))
     tests = data.tests_without_K
     of_nodes = _fitted(nodes, model, _OBJECTIVE, as_published)
+    primaries = fitted_primaries(nodes, model, of_nodes)
     parameters = {
         OPTIMISED: _fitted(tests, model, _OBJECTIVE, as_published),
-        INTERPOLATED: interpolate(at_45_0(tests), _primaries(nodes, model, of_nodes), method=interpolation),
+        INTERPOLATED: interpolate(at_45_0(tests), primaries, method=interpolation),
     }
     return ModelEvaluation(
         Appearance(nodes, {OPTIMISED: predict(model, of_nodes, nodes, as_published=as_published)}),
@@ -205,7 +206,8 @@ def _fitted(measured: Measurements, model: str, objective: Objective, as_publish
     ).parameters
 
 
-def _primaries(measured: Measurements, model: str, parameters: Array) -> Primaries:
+def fitted_primaries(measured: Measurements, model: str, parameters: Array) -> Primaries:
+    """Return measured patches with the parameters (patches, k) fitted to them, their XYZ at 45:0."""
     entries = zip(measured.patches, at_45_0(measured).tolist(), parameters.tolist(), strict=True)
     return Primaries(
         model=model,
