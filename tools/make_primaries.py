@@ -19,24 +19,12 @@ from iccbrdf.brdf.geometry import planar
 from iccbrdf.brdf.models import evaluate
 from iccbrdf.brdf.primaries import Primaries, Primary, write_primaries
 from iccbrdf.brdf.slopes import Slope, Slopes, write_slopes
+from iccbrdf.icc import D50
+from iccbrdf.measure.simulation import PRIMARIES
 
 ROOT = Path(__file__).resolve().parent.parent
 TWO_DEGREES = "CIE 1931 2 Degree Standard Observer"
-PCS_WHITE = (0.9642, 1.0, 0.8249)
 DIGITS = 6
-
-# Paper, inks, overprints and the two blacks.
-PATCHES = {
-    "White": (0, 0, 0, 0),
-    "C": (100, 0, 0, 0),
-    "M": (0, 100, 0, 0),
-    "Y": (0, 0, 100, 0),
-    "CM": (100, 100, 0, 0),
-    "CY": (100, 0, 100, 0),
-    "MY": (0, 100, 100, 0),
-    "CMY": (100, 100, 100, 0),
-    "K": (0, 0, 0, 100),
-}
 
 ANGLES = (0, 15, 30, 45, 60)
 
@@ -89,9 +77,9 @@ def make_fogra39_gloss(data: Path) -> Primaries:
     """Return FOGRA39 colours with the gloss of two paints, so that the model at 45:0 gives the XYZ."""
     glosses = {
         name: KRYLON_BLUE if np.count_nonzero(cmyk) > 1 or name == "K" else GARNET_RED
-        for name, cmyk in PATCHES.items()
+        for name, cmyk in PRIMARIES.items()
     }
-    return fogra39_print(data, PATCHES, glosses, FOGRA39_SOURCE)
+    return fogra39_print(data, PRIMARIES, glosses, FOGRA39_SOURCE)
 
 
 def make_landscape(data: Path) -> Primaries:
@@ -115,7 +103,7 @@ def fogra39_print(
     primaries = []
     for name, cmyk in patches.items():
         ks, m = glosses[name]
-        gloss = np.array([*np.multiply(ks, PCS_WHITE), m]).round(DIGITS)
+        gloss = np.array([*np.multiply(ks, D50), m]).round(DIGITS)
         black = np.concatenate([np.zeros(3), gloss])
         kd = np.subtract(colours[cmyk], factor_45_0("brdf1", black)).round(DIGITS)
         primaries.append(
@@ -125,7 +113,7 @@ def fogra39_print(
         model="brdf1",
         illuminant="D50",
         observer=TWO_DEGREES,
-        white=PCS_WHITE,
+        white=D50,
         geometry="45:0",
         source=source,
         primaries=tuple(primaries),
@@ -159,16 +147,16 @@ def make_ward_painting(data: Path) -> Primaries:
 def make_fogra39_slopes(data: Path) -> Slopes:
     """Return white and black of FOGRA39, and what thinner films of both would be on slopes."""
     colours = read_colours(data / "print" / "FOGRA39L.ti3")
-    Wf, Bf = np.array(colours[PATCHES["White"]]), np.array(colours[RICH_BLACK])
-    scattering_power = Wf / (PCS_WHITE - Wf)
+    Wf, Bf = np.array(colours[PRIMARIES["White"]]), np.array(colours[RICH_BLACK])
+    scattering_power = Wf / (D50 - Wf)
     slopes = []
     for angle in ANGLES:
         thickness = planar(angle)[2]
         t = scattering_power * thickness
-        Ws = PCS_WHITE * t / (1 + t)
+        Ws = D50 * t / (1 + t)
         Bs = Ws * (Bf / Wf) ** thickness
         slopes.append(Slope(float(angle), *(tuple(XYZ.round(DIGITS).tolist()) for XYZ in (Ws, Bs))))
-    return Slopes("D50", TWO_DEGREES, PCS_WHITE, "0:45", SLOPES_SOURCE, tuple(slopes))
+    return Slopes("D50", TWO_DEGREES, D50, "0:45", SLOPES_SOURCE, tuple(slopes))
 
 
 def factor_45_0(model: str, parameters: NDArray[np.float64]) -> NDArray[np.float64]:
