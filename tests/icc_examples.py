@@ -2,10 +2,10 @@
 
 import json
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import SHARED
 
 from iccbrdf.calc.program import parse
 from iccbrdf.icc import (
@@ -30,8 +30,6 @@ from iccbrdf.icc import (
     TintArray,
     ViewingConditions,
 )
-
-SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 
 def unhex(text):

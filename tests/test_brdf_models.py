@@ -2,10 +2,10 @@
 
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import SHARED
 
 from iccbrdf.brdf.cook_torrance import (
     M_MIN,
@@ -20,7 +20,7 @@ from iccbrdf.brdf.models import MODELS, evaluate
 from iccbrdf.brdf.ward import ward
 from iccbrdf.errors import UsageError
 
-FITS = Path(__file__).resolve().parents[2] / "shared" / "data" / "published-fits"
+FITS = SHARED / "data" / "published-fits"
 UP = (0, 0, 1)
 FORMS = ("stable", "literal")
 

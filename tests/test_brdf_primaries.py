@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import SHARED
 
 from iccbrdf.brdf.geometry import planar
 from iccbrdf.brdf.models import MODELS, evaluate
@@ -17,7 +18,7 @@ from iccbrdf.errors import InputError, UsageError
 from iccbrdf.resources import folder
 
 ROOT = Path(__file__).resolve().parent.parent
-DATA = ROOT.parent / "shared" / "data"
+DATA = SHARED / "data"
 EXAMPLES = [folder("profiles") / name / "primaries.json" for name in ("fogra39_gloss", "ward_painting")]
 
 CONTENTS = {

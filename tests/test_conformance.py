@@ -3,10 +3,10 @@
 import json
 import re
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import SHARED
 
 from iccbrdf.calc import elements
 from iccbrdf.calc.interpreter import run
@@ -14,7 +14,7 @@ from iccbrdf.calc.program import parse
 from iccbrdf.calc.verify import verify, verify_element
 from iccbrdf.icc import Profile
 
-ARCHIVE = Path(__file__).parents[1].parent / "shared" / "conformance" / "calculator-cases.zip"
+ARCHIVE = SHARED / "conformance" / "calculator-cases.zip"
 pytestmark = [
     pytest.mark.skipif(not ARCHIVE.exists(), reason=f"no conformance cases at {ARCHIVE}"),
     # The reference tools overstate the size of a calculator's function.

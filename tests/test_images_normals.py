@@ -1,12 +1,12 @@
 """Normal and height maps: a bump must stay a bump, whatever the file."""
 
 import warnings
-from pathlib import Path
 
 import imagecodecs
 import numpy as np
 import pytest
 import tifffile
+from conftest import SHARED
 
 from iccbrdf.errors import InputError, LimitError, UsageError
 from iccbrdf.images import Block, create_tiff, pictures
@@ -15,7 +15,7 @@ from iccbrdf.images.pictures import read_picture
 
 SIZE = 65
 PITCH = 0.1
-PAINTING = Path(__file__).resolve().parents[2] / "shared" / "data" / "painting"
+PAINTING = SHARED / "data" / "painting"
 
 
 def hemisphere():
