@@ -19,6 +19,21 @@ Beside the calculator's own operators of the kinds EACH and REDUCE (calc/operato
 | select |                 | condition, yes, no: only the chosen one need be computed             |
 
 An operator that gives several vectors (`tLab`: 3) has them one after the other in one node.
+
+Graphs that are lifted from programs to be run (calc/lift.py) are plainer: every node is one number of the
+working type, operators that others can express are expressed by them, and there are further kinds.
+
+| op       | detail        | value                                                              |
+|----------|---------------|--------------------------------------------------------------------|
+| variable | name          | a run-time variable, 0 where it is undefined                       |
+| defined  | name          | whether it is defined                                              |
+| curve    | the curve     | one curve of a curve set                                           |
+| clut     | the element   | a look-up table's outputs, read by `pick`                          |
+| tint     | the element   | a tint array's outputs, read by `pick`                             |
+| solve    | rows, columns | the unknowns and the flag of `solv`, read by `pick`                |
+
+There the operators of TRUTHS take and give conditions, and a select's condition is one.  A condition that
+stands where a number is wanted is 1 or 0.
 """
 
 from __future__ import annotations
@@ -31,6 +46,11 @@ import numpy as np
 
 from iccbrdf.calc.operators import OPERATORS, Kind
 from iccbrdf.errors import IccBrdfError
+
+COMPARISONS = frozenset(("lt", "le", "eq", "neq", "ge", "gt"))
+LOGIC = frozenset(("not", "vand", "vor", "vxor"))
+TRUTHS = COMPARISONS | LOGIC | {"rnum", "defined"}
+"""Operators whose value is a condition: 1 or 0 where a number is wanted."""
 
 
 class GraphError(IccBrdfError):
@@ -60,6 +80,8 @@ class Graph:
 
     nodes: list[Node] = field(default_factory=list)
     outputs: tuple[Node, ...] = ()
+    dtype: type[np.floating[Any]] = np.float64
+    """The type that constants are exact in, and are folded in."""
     shared: int = 0
     """How often an operator was asked for that was there already."""
     _known: dict[tuple[Any, ...], Node] = field(default_factory=dict, repr=False)
@@ -121,6 +143,11 @@ def needed_by(nodes: Iterable[Node], skip: Callable[[Node], bool] = lambda node:
 # Rules -------------------------------------------------------------------------------------------------
 
 
+def is_truth(node: Node) -> bool:
+    """Whether the node is a condition."""
+    return node.op in TRUTHS
+
+
 def is_elementwise(op: str) -> bool:
     """Whether the op works on each component alone and gives one vector."""
     row = OPERATORS.get(op)
@@ -144,17 +171,30 @@ def _require(holds: bool, op: str, arguments: Sequence[Node], rule: str) -> None
         raise GraphError(f"{op} of widths {[argument.width for argument in arguments]}: {rule}")
 
 
+_COUNTS = {
+    "const": 0, "input": 0, "env": 0, "variable": 0, "defined": 0,
+    "pick": 1, "splat": 1, "rotl": 1, "curve": 1, "tint": 1, "select": 3,
+}  # fmt: skip
+"""How many arguments the kinds of nodes take that are no calculator operators."""
+
+
 def _width(op: str, arguments: Sequence[Node], detail: Any, asked: int) -> int:
     """The width of a node, or GraphError where its parts do not fit."""
     widths = [argument.width for argument in arguments]
-    counts = {"const": 0, "input": 0, "env": 0, "pick": 1, "splat": 1, "rotl": 1, "select": 3}
-    if op in counts:
-        _require(len(arguments) == counts[op], op, arguments, f"takes {counts[op]} argument(s)")
+    if op in _COUNTS:
+        _require(len(arguments) == _COUNTS[op], op, arguments, f"takes {_COUNTS[op]} argument(s)")
     if op == "const":
         _require(len(detail) > 0, op, arguments, "needs a number")
         return len(detail)
-    if op == "env":
+    if op in ("env", "variable", "defined", "curve"):
         return 1
+    if op in ("clut", "tint"):
+        _require(widths == [1] * detail.inputs, op, arguments, f"takes {detail.inputs} numbers")
+        return int(detail.outputs)
+    if op == "solve":
+        rows, columns = detail
+        _require(widths == [1] * (rows * (columns + 1)), op, arguments, f"is of {rows} x {columns}")
+        return int(columns) + 1
     if op == "input":
         _require(asked > 0 and detail >= 0, op, arguments, "needs channels")
         return asked
@@ -217,9 +257,13 @@ def check(graph: Graph) -> None:
 
 
 def evaluate(
-    op: str, arguments: Sequence[Sequence[float]], detail: Any, width: int
+    op: str,
+    arguments: Sequence[Sequence[float]],
+    detail: Any,
+    width: int,
+    dtype: type[np.floating[Any]] = np.float64,
 ) -> tuple[float, ...] | None:
-    """The value in float64 of a node whose arguments are these numbers; None for what only a run knows."""
+    """The value in `dtype` of a node whose arguments are these numbers; None for what only a run knows."""
     if op == "pack":
         return tuple(value for argument in arguments for value in argument)
     if op == "pick":
@@ -233,7 +277,7 @@ def evaluate(
     row = OPERATORS.get(op)
     if row is None or row.function is None:
         return None
-    planes = [[np.float64(value) for value in argument] for argument in arguments]
+    planes = [[dtype(value) for value in argument] for argument in arguments]
     with np.errstate(all="ignore"):
         if row.kind is Kind.REDUCE:
             return (float(row.function(planes[0])),)

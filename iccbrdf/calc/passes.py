@@ -50,11 +50,12 @@ def uniform(node: Node) -> float | None:
 
 
 def constant(graph: Graph, node: Node) -> Node | None:
-    """An operator on constants is a constant, computed in float64; one that repeats a number is a splat."""
+    """An operator on constants is a constant, in the graph's type; one that repeats a number is a splat."""
     arguments = [known(argument) for argument in node.arguments]
     if node.op == "splat" or not arguments or None in arguments:
         return None
-    values = evaluate(node.op, [values for values in arguments if values], node.detail, node.width)
+    numbers = [values for values in arguments if values]
+    values = evaluate(node.op, numbers, node.detail, node.width, graph.dtype)
     if values is None:
         return None
     if len(values) > 1 and len(set(values)) == 1:
@@ -191,7 +192,7 @@ def rewrite(graph: Graph, rules: Sequence[Rule]) -> tuple[Graph, Counter[str]]:
 
     Only what the outputs need is rebuilt, so that this also removes dead nodes and shares equal ones.
     """
-    result = Graph()
+    result = Graph(dtype=graph.dtype)
     changes: Counter[str] = Counter()
     replaced: dict[Node, Node] = {}
     for node in graph.live():
