@@ -116,15 +116,18 @@ def _calculator(element: Any, channels: Sequence[Value], env: Environment) -> li
 # Curves: float64 in, float64 out -----------------------------------------------------------------------
 
 
+def apply_curve(curve: Any, x: Value, env: Environment) -> Value:
+    """One curve of a curve set: computed in float64, rounded once to the type of x."""
+    if curve.signature not in _CURVES:
+        known = ", ".join(_CURVES)
+        raise UnsupportedError(f"curve {curve.signature!r} cannot be evaluated, only {known}")
+    wide = _CURVES[curve.signature](curve, x.astype(np.float64), env)
+    rounded: Value = wide.astype(x.dtype)[()]
+    return rounded
+
+
 def _curve_set(element: Any, channels: Sequence[Value], env: Environment) -> list[Value]:
-    results = []
-    for curve, x in zip(element.curves, channels, strict=True):
-        if curve.signature not in _CURVES:
-            known = ", ".join(_CURVES)
-            raise UnsupportedError(f"curve {curve.signature!r} cannot be evaluated, only {known}")
-        wide = _CURVES[curve.signature](curve, x.astype(np.float64), env)
-        results.append(wide.astype(x.dtype)[()])
-    return results
+    return [apply_curve(curve, x, env) for curve, x in zip(element.curves, channels, strict=True)]
 
 
 def _segmented(curve: Any, x: Value, env: Environment) -> Value:
@@ -160,9 +163,14 @@ def _sampled(curve: Any, x: Value, env: Environment) -> Value:
 
 
 def _sampled_calculator(curve: Any, x: Value, env: Environment) -> Value:
+    return _between(calculator_samples(curve, env), curve, x)
+
+
+def calculator_samples(curve: Any, env: Environment) -> Value:
+    """The samples of a calculator curve (float32 numbers in float64), equally spaced."""
     entries = np.linspace(curve.first, curve.last, curve.size)
     (values,) = _calculator(curve.calculator, [entries.astype(np.float32)], env)
-    return _between(np.broadcast_to(values, entries.shape).astype(np.float64), curve, x)
+    return np.broadcast_to(values, entries.shape).astype(np.float64)
 
 
 def _between(nodes: Value, curve: Any, x: Value) -> Value:

@@ -179,11 +179,13 @@ def sign(graph: Graph, node: Node) -> Node | None:
     return None
 
 
-PASSES: tuple[tuple[str, tuple[Rule, ...]], ...] = (
+Passes: TypeAlias = tuple[tuple[str, tuple[Rule, ...]], ...]
+
+PASSES: Passes = (
     ("fold constants", (constant, known_condition)),
     ("simplify", (whole, flat_pack, direct_pick, neutral, square, sign)),
 )
-"""The passes in their order; each runs again until none finds anything to do."""
+"""The passes of templates in their order; each runs again until none finds anything to do."""
 
 
 def rewrite(graph: Graph, rules: Sequence[Rule]) -> tuple[Graph, Counter[str]]:
@@ -210,8 +212,8 @@ def rewrite(graph: Graph, rules: Sequence[Rule]) -> tuple[Graph, Counter[str]]:
     return result, changes
 
 
-def optimise(graph: Graph) -> tuple[Graph, tuple[Report, ...]]:
-    """Return the graph after all passes, with no dead nodes, and one report for each pass."""
+def optimise(graph: Graph, passes: Passes = PASSES) -> tuple[Graph, tuple[Report, ...]]:
+    """Return the graph after all of `passes`, with no dead nodes, and one report for each pass."""
     check(graph)
     total, live, repeated = len(graph.nodes), len(graph.live()), graph.shared
     reports = [
@@ -221,7 +223,7 @@ def optimise(graph: Graph) -> tuple[Graph, tuple[Report, ...]]:
     done = False
     while not done:
         done = True
-        for name, rules in PASSES:
+        for name, rules in passes:
             rewritten, changes = rewrite(graph, rules)
             if changes:
                 done = False
