@@ -8,10 +8,8 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import click
-import numpy as np
 
-from iccbrdf.brdf.geometry import direction
-from iccbrdf.errors import UsageError
+from iccbrdf.scene import environment as environment
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -51,55 +49,9 @@ def scene_options(command: F) -> F:
     return command
 
 
-def environment(light: str | None, view: str | None, env: tuple[str, ...]) -> dict[str, float]:
-    """Run-time variables that the scene options set; --env has the last word."""
-    values: dict[str, float] = {}
-    for option, text, names in (
-        ("--light", light, ("litX", "litY", "litZ")),
-        ("--view", view, ("vueX", "vueY", "vueZ")),
-    ):
-        if text is not None:
-            values.update(zip(names, parse_direction(option, text), strict=True))
-    for item in env:
-        name, equals, value = item.partition("=")
-        if not equals or not name:
-            raise UsageError(f"--env {item!r}: expected NAME=VALUE")
-        values[name] = _number("--env " + name, value)
-    return values
-
-
-def parse_direction(option: str, text: str) -> tuple[float, float, float]:
-    """A unit vector from `ZENITH,AZIMUTH` in degrees or from a vector `X,Y,Z` of any length."""
-    numbers = [_number(option, part) for part in text.split(",")]
-    if len(numbers) == 2:
-        if abs(numbers[0]) > 90:
-            raise UsageError(f"{option} {text!r}: the zenith angle is {numbers[0]:g}, expected -90 to 90")
-        vector = direction(*numbers)
-    elif len(numbers) == 3:
-        # Scaled first, so that no square overflows or vanishes.
-        vector = np.array(numbers) / (max(map(abs, numbers)) or 1)
-    else:
-        raise UsageError(f"{option} {text!r}: expected ZENITH,AZIMUTH in degrees or a vector X,Y,Z")
-    length = np.linalg.norm(vector)
-    if length == 0:
-        raise UsageError(f"{option} {text!r}: a vector of length 0 has no direction")
-    x, y, z = (vector / length).tolist()
-    return x, y, z
-
-
 def name_list(text: str) -> list[str]:
     """Names separated by commas."""
     return [name.strip() for name in text.split(",") if name.strip()]
-
-
-def _number(option: str, text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise UsageError(f"{option}: found {text!r}, expected a finite number")
-    return number
 
 
 def emit(as_json: bool, schema: str, result: dict[str, Any], text: str) -> None:

@@ -14,7 +14,7 @@ from iccbrdf.images.record import SAMPLES, U1_15_ONE, Record, Samples, from_desc
 from iccbrdf.images.tiff_storage import TiffStorage
 
 
-def open_tiff(path: StrPath, samples: Samples | None = None) -> TiffSource:
+def open_tiff(path: StrPath, samples: Samples | None = None, *, lab: bool = False) -> TiffSource:
     """Open a TIFF of one image for reading; use it in a `with` statement.
 
     Parameters
@@ -25,6 +25,8 @@ def open_tiff(path: StrPath, samples: Samples | None = None) -> TiffSource:
     samples
         What the samples mean, for a float file that does not say so itself (see `iccbrdf.images.record`):
         "device" (0..1, the default) or "real" (physical values).  Integers without a record are "device".
+    lab
+        Also L*a*b* images, whose integers come scaled to 0..1 like all others (`photometric` says which).
 
     Raises
     ------
@@ -41,7 +43,7 @@ def open_tiff(path: StrPath, samples: Samples | None = None) -> TiffSource:
     ...     for y0, x0, data in source.blocks():
     ...         process(data)
     """
-    return TiffSource(path, samples)
+    return TiffSource(path, samples, lab=lab)
 
 
 class TiffSource:
@@ -59,18 +61,23 @@ class TiffSource:
         "device" or "real".
     profile
         The ICC profile embedded in the file (tag 34675), or None.
+    photometric, extra_samples, ink_set
+        As `iccbrdf.images.tiff_storage.TiffStorage` has them.
     """
 
-    def __init__(self, path: StrPath, samples: Samples | None = None) -> None:
+    def __init__(self, path: StrPath, samples: Samples | None = None, *, lab: bool = False) -> None:
         if samples is not None and samples not in SAMPLES:
             raise UsageError(f"{path}: unknown samples {samples!r}: {nearest(samples, SAMPLES)}")
         self._path = path
-        self._storage = TiffStorage(path)
+        self._storage = TiffStorage(path, lab=lab)
         self.height: int = self._storage.height
         self.width: int = self._storage.width
         self.channels = self._storage.channels
         self.dtype = self._storage.dtype
         self.profile = self._storage.profile
+        self.photometric = self._storage.photometric
+        self.extra_samples = self._storage.extra_samples
+        self.ink_set = self._storage.ink_set
         try:
             record = from_description(self._storage.description, path)
             self._check_meaning(record, samples)

@@ -24,6 +24,7 @@ MAX_CHANNELS = 256
 
 _DTYPES = ("u1", "u2", "f2", "f4", "f8")
 _PHOTOMETRICS = ("MINISBLACK", "RGB", "SEPARATED")
+LAB_PHOTOMETRICS = ("CIELAB", "ICCLAB")
 _COMPRESSIONS = ("NONE", "LZW", "ADOBE_DEFLATE", "DEFLATE", "PACKBITS", "LZMA", "ZSTD")
 
 
@@ -38,12 +39,19 @@ class TiffStorage:
         The type of the samples, with the byte order of the file.
     description, profile
         The ImageDescription ("" without one) and the embedded ICC profile (None without one).
+    photometric
+        What the samples are, by the name of the tag's value: "RGB", "SEPARATED", ...
+    extra_samples
+        How many channels are more than the photometric interpretation has.
+    ink_set
+        Of separated samples: 1 for CMYK, else other inks.
     unit
         Height and width of what can only be read together: a compressed segment, or one pixel.
     """
 
-    def __init__(self, path: StrPath) -> None:
+    def __init__(self, path: StrPath, *, lab: bool = False) -> None:
         self._path = path
+        self._photometrics = _PHOTOMETRICS + LAB_PHOTOMETRICS * lab
         try:
             self._file: Any = tifffile.TiffFile(path)
         except OSError as error:
@@ -65,7 +73,7 @@ class TiffStorage:
 
     def _parse(self) -> None:
         path = self._path
-        page = self._page = _only_image(self._file, path)
+        page = self._page = _only_image(self._file, path, self._photometrics)
         self._planes, _, self.height, self.width, contiguous = page.shaped
         self.channels: int = self._planes * contiguous
         if self.channels > MAX_CHANNELS:
@@ -78,6 +86,9 @@ class TiffStorage:
         self.dtype = _sample_type(page, self._file.byteorder, path)
         self.description: str = page.description
         self.profile: bytes | None = page.iccprofile
+        self.photometric: str = page.photometric.name
+        self.extra_samples = len(page.extrasamples)
+        self.ink_set: int = page.tags.valueof(332, 1)
         self._pixel_bytes = contiguous * self.dtype.itemsize
         if page.is_tiled:
             self._grid = Grid(self.height, self.width, page.tilelength, page.tilewidth)
@@ -163,7 +174,7 @@ class TiffStorage:
         return pixels
 
 
-def _only_image(file: Any, path: StrPath) -> Any:
+def _only_image(file: Any, path: StrPath, photometrics: tuple[str, ...]) -> Any:
     """The one page of a file that is neither a thumbnail nor another reduction."""
     pages = [page for page in file.pages if not page.is_reduced]
     if not pages:
@@ -178,7 +189,7 @@ def _only_image(file: Any, path: StrPath) -> Any:
     if page.shaped[1] != 1:
         raise UnsupportedError(f"{path}: an image of {page.shaped[1]} slices, expected a flat one")
     for what, value, supported in (
-        ("photometric interpretation", page.photometric, _PHOTOMETRICS),
+        ("photometric interpretation", page.photometric, photometrics),
         # Not the lossy ones: what they lose is measured for the eye, not for normals and roughness.
         ("compression", page.compression, _COMPRESSIONS),
     ):

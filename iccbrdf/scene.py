@@ -1,0 +1,58 @@
+"""Light and view as people write them -> run-time variables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from iccbrdf.brdf.geometry import direction
+from iccbrdf.errors import UsageError
+
+LIGHT = ("litX", "litY", "litZ")
+VIEW = ("vueX", "vueY", "vueZ")
+
+
+def environment(light: str | None, view: str | None, env: Iterable[str]) -> dict[str, float]:
+    """Run-time variables that a light, a view and items `NAME=VALUE` set; the items have the last word."""
+    values: dict[str, float] = {}
+    for option, text, names in (("--light", light, LIGHT), ("--view", view, VIEW)):
+        if text is not None:
+            values.update(zip(names, parse_direction(option, text), strict=True))
+    for item in env:
+        name, equals, value = item.partition("=")
+        if not equals or not name:
+            raise UsageError(f"--env {item!r}: expected NAME=VALUE")
+        values[name] = parse_number("--env " + name, value)
+    return values
+
+
+def parse_direction(option: str, text: str) -> tuple[float, float, float]:
+    """A unit vector from `ZENITH,AZIMUTH` in degrees or from a vector `X,Y,Z` of any length."""
+    numbers = [parse_number(option, part) for part in text.split(",")]
+    if len(numbers) == 2:
+        if abs(numbers[0]) > 90:
+            raise UsageError(f"{option} {text!r}: the zenith angle is {numbers[0]:g}, expected -90 to 90")
+        vector = direction(*numbers)
+    elif len(numbers) == 3:
+        # Scaled first, so that no square overflows or vanishes.
+        vector = np.array(numbers) / (max(map(abs, numbers)) or 1)
+    else:
+        raise UsageError(f"{option} {text!r}: expected ZENITH,AZIMUTH in degrees or a vector X,Y,Z")
+    length = np.linalg.norm(vector)
+    if length == 0:
+        raise UsageError(f"{option} {text!r}: a vector of length 0 has no direction")
+    x, y, z = (vector / length).tolist()
+    return x, y, z
+
+
+def parse_number(option: str, text: str) -> float:
+    """A finite number; `option` names the place in the message of the UsageError."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise UsageError(f"{option}: found {text!r}, expected a finite number")
+    return number
