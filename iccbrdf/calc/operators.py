@@ -224,7 +224,7 @@ def _save(machine: Machine, values: Sequence[Value], s: int, t: int) -> Sequence
 
 def _environment(machine: Machine, values: Sequence[Value], s: int, t: int) -> Sequence[Value]:
     value = machine.variable((s << 16) | t)
-    return [machine.dtype(value or 0.0), machine.dtype(value is not None)]
+    return [machine.dtype(0.0 if value is None else value), machine.dtype(value is not None)]
 
 
 def _apply_element(machine: Machine, values: Sequence[Value], s: int, t: int) -> Sequence[Value]:
