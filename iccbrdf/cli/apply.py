@@ -140,7 +140,6 @@ def command(
         settings: dict[str, Any] = {
             "env": variables,
             "intent": intent,
-            "threads": workers,
             "dtype": "float64" if double else "float32",
             "samples": source.samples,
         }
@@ -156,6 +155,7 @@ def command(
             overwrite=force,
             label=image.name,
             last_slope=last_slope(chain[0]),
+            workers=workers,
         )
         size = f"{source.width} x {source.height} pixels"
         result = {

@@ -1,25 +1,28 @@
-"""An image through a transform into files, block by block: what `apply` and `demo` share."""
+"""An image through a transform into files, block by block: what `apply` and `demo` share.
+
+A worker takes a block from the file to the samples of the outputs; what must come in order, the writing, is
+done by the one thread that gives out the blocks (`iccbrdf.images.in_order`).  So reading, computing and
+writing overlap, and memory is that of some blocks, however large the image.
+"""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from iccbrdf.brdf.models import NORMAL
-from iccbrdf.brdf.slopes import slope_angle
 from iccbrdf.cmm import Transform, standard_XYZ
 from iccbrdf.errors import UsageError, nearest
 from iccbrdf.files import check_target
 from iccbrdf.icc import Profile
-from iccbrdf.images import Block, ImageSource, create_tiff
-from iccbrdf.images.display import create_png
+from iccbrdf.images import ImageSource, Place, create_png, create_tiff, in_order
 
 TIFF_SUFFIXES = (".tif", ".tiff")
 PNG_SUFFIX = ".png"
@@ -44,6 +47,16 @@ class Output:
     @property
     def is_png(self) -> bool:
         return self.path.suffix.lower() == PNG_SUFFIX
+
+
+class _Worked(NamedTuple):
+    """What a worker made of a block: the blocks that the sinks will put, and what it met."""
+
+    pixels: int
+    encoded: list[Any]
+    not_finite_in: int
+    not_finite_out: int
+    beyond_slopes: int
 
 
 @dataclass
@@ -83,10 +96,16 @@ def run(
     overwrite: bool,
     label: str,
     last_slope: float | None = None,
+    workers: int = 1,
 ) -> Done:
     """Stream `source` through `transform`, whose chain ends on profile `last`, into `outputs`.
 
-    `last_slope`: the steepest slope in degrees that the chain has measurements for, if it adjusts to slopes.
+    Parameters
+    ----------
+    last_slope
+        The steepest slope in degrees that the chain has measurements for, if it adjusts to slopes.
+    workers
+        Blocks that are read and computed at a time; the result does not depend on it.
     """
     to_display = None
     if any(output.is_png for output in outputs):
@@ -99,15 +118,35 @@ def run(
     done = Done()
     with ExitStack() as stack:
         sinks = [stack.enter_context(_open(output, source, transform, overwrite)) for output in outputs]
-        for block in _progress(source, label):
-            result = transform(block.data)
-            done.not_finite_in += _not_finite(block.data)
-            done.not_finite_out += _not_finite(result)
-            if last_slope is not None:
-                done.beyond_slopes += _steeper(block.data, source.samples, transform.channels_in, last_slope)
-            display = to_display(result) if to_display else result
-            for output, sink in zip(outputs, sinks, strict=True):
-                sink.write(block._replace(data=display if output.is_png else result))
+        advance = stack.enter_context(_progress(source, label))
+
+        def work(place: Place) -> _Worked:
+            block = source.read(place)
+            result = block._replace(data=transform(block.data))
+            display = block._replace(data=to_display(result.data)) if to_display else result
+            encoded = [
+                sink.encode(display if output.is_png else result)
+                for output, sink in zip(outputs, sinks, strict=True)
+            ]
+            return _Worked(
+                pixels=place.height * place.width,
+                encoded=encoded,
+                not_finite_in=_not_finite(block.data),
+                not_finite_out=_not_finite(result.data),
+                beyond_slopes=_steeper(block.data, source.samples, transform.channels_in, last_slope),
+            )
+
+        def take(worked: _Worked) -> None:
+            for sink, encoded in zip(sinks, worked.encoded, strict=True):
+                sink.put(encoded)
+            done.not_finite_in += worked.not_finite_in
+            done.not_finite_out += worked.not_finite_out
+            done.beyond_slopes += worked.beyond_slopes
+            advance(worked.pixels)
+
+        with in_order(workers, take) as submit:
+            for place in source.places():
+                submit(work, place)
     for output, sink in zip(outputs, sinks, strict=True):
         counts = ("above_white", "out_of_gamut") if output.is_png else ("clipped",)
         done.outputs.append({"path": str(output.path), **{name: getattr(sink, name) for name in counts}})
@@ -115,17 +154,25 @@ def run(
 
 
 def _not_finite(data: npt.NDArray[Any]) -> int:
+    # One pass where all are finite, which a finite sum shows.
+    with np.errstate(over="ignore", invalid="ignore"):
+        if np.isfinite(data.sum()):
+            return 0
     return data.size - int(np.count_nonzero(np.isfinite(data)))
 
 
-def _steeper(data: npt.NDArray[Any], samples: str, names: Sequence[str], limit: float) -> int:
-    """The number of pixels whose normal leans by more than `limit` degrees."""
-    if not set(NORMAL) <= set(names):
+def _steeper(data: npt.NDArray[Any], samples: str, names: Sequence[str], limit: float | None) -> int:
+    """The number of pixels whose normal leans by more than `limit` degrees, in 0..90; 0 without one."""
+    if limit is None or not set(NORMAL) <= set(names):
         return 0
-    normals = data[..., [names.index(name) for name in NORMAL]]
-    angles = slope_angle(2 * normals - 1 if samples == "device" else normals)
+    normals = (data[..., names.index(name)] for name in NORMAL)
+    x, y, z = (np.asarray(2 * n - 1 if samples == "device" else n, np.float64) for n in normals)
     # float32 normals of just that slope are not steeper.
-    return int(np.count_nonzero(angles > limit + 1e-3))
+    angle = np.radians(limit + 1e-3)
+    # The sine of the excess angle is above 0, without an arc tangent for each pixel.
+    with np.errstate(invalid="ignore"):
+        steeper = np.sqrt(x * x + y * y) * np.cos(angle) > z * np.sin(angle)
+    return int(np.count_nonzero(steeper))
 
 
 def _open(output: Output, source: ImageSource, transform: Transform, overwrite: bool) -> Any:
@@ -150,10 +197,11 @@ def _open(output: Output, source: ImageSource, transform: Transform, overwrite: 
     )
 
 
-def _progress(source: ImageSource, label: str) -> Iterable[Block]:
-    """The blocks of `source`, with a progress bar where stderr is a terminal."""
+@contextmanager
+def _progress(source: ImageSource, label: str) -> Iterator[Callable[[int], None]]:
+    """A progress bar where stderr is a terminal; gives what is to be told the pixels that are done."""
     if not sys.stderr.isatty():
-        yield from source.blocks()
+        yield lambda pixels: None
         return
     from rich.console import Console
     from rich.markup import escape
@@ -161,10 +209,7 @@ def _progress(source: ImageSource, label: str) -> Iterable[Block]:
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(escape(label), total=source.height * source.width)
-        for block in source.blocks():
-            yield block
-            height, width, _ = block.data.shape
-            bar.advance(task, height * width)
+        yield lambda pixels: bar.advance(task, pixels)
 
 
 def arranged_channels(

@@ -1,7 +1,8 @@
 """Images in and out: TIFF streams, normal and height maps, PNG for the display."""
 
-from iccbrdf.images.blocks import Block
+from iccbrdf.images.blocks import Block, Place
 from iccbrdf.images.display import PngSink, create_png, srgb_profile, xyz_to_srgb
+from iccbrdf.images.in_order import in_order
 from iccbrdf.images.normals import height_to_normals, read_height_map, read_normal_map
 from iccbrdf.images.pictures import read_picture
 from iccbrdf.images.record import Samples
@@ -12,6 +13,7 @@ from iccbrdf.images.with_normals import ImageSource, WithNormals
 __all__ = [
     "Block",
     "ImageSource",
+    "Place",
     "PngSink",
     "Samples",
     "TiffSink",
@@ -20,6 +22,7 @@ __all__ = [
     "create_png",
     "create_tiff",
     "height_to_normals",
+    "in_order",
     "open_tiff",
     "read_height_map",
     "read_normal_map",

@@ -26,6 +26,15 @@ class Block(NamedTuple):
     data: Array
 
 
+class Place(NamedTuple):
+    """Where a block lies in its image: first row, first column, height and width in pixels."""
+
+    y0: int
+    x0: int
+    height: int
+    width: int
+
+
 class Part(NamedTuple):
     """Where a rectangle meets a segment: the segment's number and the common pixels, seen from both sides."""
 
@@ -92,8 +101,8 @@ class Coverage:
         self._shape = height, width, channels
         self._missing = height * width
 
-    def add(self, block: Block) -> None:
-        """Count a block; UsageError where it does not fit."""
+    def check(self, block: Block) -> None:
+        """UsageError where a block does not fit."""
         height, width, channels = self._shape
         shape = block.data.shape
         fits = len(shape) == 3 and shape[2] == channels
@@ -102,7 +111,11 @@ class Coverage:
                 f"{self._path}: a block of shape {shape} at row {block.y0}, column {block.x0} does not fit "
                 f"an image of {height} x {width} pixels with {channels} channels"
             )
-        self._missing -= shape[0] * shape[1]
+
+    def count(self, block: Block) -> None:
+        """Count a block as written."""
+        height, width, _ = block.data.shape
+        self._missing -= height * width
 
     def check_filled(self) -> None:
         """UsageError unless as many pixels came as the image has."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import BinaryIO, Literal
+from typing import BinaryIO, Literal, NamedTuple
 
 import imagecodecs
 import numpy as np
@@ -55,6 +55,15 @@ def xyz_to_srgb(xyz: Array) -> Array:
     return rgb
 
 
+class Levels(NamedTuple):
+    """A block in the levels of the display, and how many of its pixels `PngSink` counts as what."""
+
+    block: Block
+    above_white: int
+    out_of_gamut: int
+    not_finite: int
+
+
 class PngSink:
     """A PNG that is being written.  See `create_png`.
 
@@ -85,13 +94,25 @@ class PngSink:
 
     def write(self, block: Block) -> None:
         """Write a block of XYZ (D50, Y = 1 for white); UsageError where it does not fit or follow."""
-        self._coverage.add(block)
-        self.not_finite += _pixels(~np.isfinite(block.data))
+        self.put(self.encode(block))
+
+    def encode(self, block: Block) -> Levels:
+        """The part of `write` that any thread may do, for several blocks at a time; the rest is `put`."""
+        self._coverage.check(block)
+        not_finite = _pixels(~np.isfinite(block.data))
         levels = np.rint(xyz_to_srgb(block.data * self._exposure) * self._largest)
-        self.above_white += _pixels(levels > self._largest)
-        self.out_of_gamut += _pixels(levels < 0)
+        above, outside = _pixels(levels > self._largest), _pixels(levels < 0)
         pixels = levels.clip(0, self._largest).astype(self._dtype)
-        for band, rows in self._assembler.add(block._replace(data=pixels)):
+        return Levels(block._replace(data=pixels), above, outside, not_finite)
+
+    def put(self, levels: Levels) -> None:
+        """Write what `encode` gave; UsageError where it does not follow."""
+        block = levels.block
+        self._coverage.count(block)
+        self.above_white += levels.above_white
+        self.out_of_gamut += levels.out_of_gamut
+        self.not_finite += levels.not_finite
+        for band, rows in self._assembler.add(block):
             if band != self._next_band:
                 raise UsageError(
                     f"{self._path}: a block at row {block.y0} came before those above it; "

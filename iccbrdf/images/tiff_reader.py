@@ -9,9 +9,14 @@ import numpy as np
 
 from iccbrdf.errors import InputError, UsageError, nearest
 from iccbrdf.files import StrPath
-from iccbrdf.images.blocks import Array, Block
+from iccbrdf.images.blocks import Array, Block, Place
 from iccbrdf.images.record import SAMPLES, U1_15_ONE, Record, Samples, from_description
 from iccbrdf.images.tiff_storage import TiffStorage
+
+BLOCK_PIXELS = 1 << 18
+"""Pixels of a block, unless a caller says otherwise."""
+BLOCK_SAMPLES = 1 << 22
+"""Samples of a block at most, which bounds the memory of a block of many channels."""
 
 
 def open_tiff(path: StrPath, samples: Samples | None = None, *, lab: bool = False) -> TiffSource:
@@ -122,15 +127,32 @@ class TiffSource:
                 f"{record.encoding!r}, which does not go with {self.dtype.name}"
             )
 
-    def blocks(self, max_pixels: int = 1 << 18) -> Iterator[Block]:
-        """The image as float32 blocks in row order; integers scaled to 0..1 (real XYZ in u1.15 to XYZ).
+    def blocks(self, max_pixels: int = BLOCK_PIXELS) -> Iterator[Block]:
+        """The image block by block: `read` at each of `places`."""
+        return map(self.read, self.places(max_pixels))
 
-        Floats come as they are, those that are not finite included.
+    def places(self, max_pixels: int = BLOCK_PIXELS) -> Iterator[Place]:
+        """Where the blocks of the image lie, in row order.
 
         Parameters
         ----------
         max_pixels
-            Blocks have at most so many pixels, except where a single compressed segment has more.
+            Blocks have at most so many pixels, and 2^22 samples, except where a single compressed segment has
+            more.
+        """
+        max_pixels = min(max_pixels, BLOCK_SAMPLES // self.channels)
+        unit_height, unit_width = self._storage.unit
+        unit_pixels = unit_height * unit_width
+        columns = unit_width * min(-(-self.width // unit_width), max(1, max_pixels // unit_pixels))
+        rows = unit_height * max(1, max_pixels // (unit_height * columns))
+        for y0 in range(0, self.height, rows):
+            for x0 in range(0, self.width, columns):
+                yield Place(y0, x0, min(rows, self.height - y0), min(columns, self.width - x0))
+
+    def read(self, place: Place) -> Block:
+        """The block at a place, float32; integers scaled to 0..1 (real XYZ in u1.15 to XYZ).
+
+        Floats come as they are, those that are not finite included.  Several threads may read at a time.
 
         Raises
         ------
@@ -138,17 +160,10 @@ class TiffSource:
             A segment is damaged; or the meaning of a float file is neither recorded nor declared and a value
             lies outside 0..1.
         """
-        unit_height, unit_width = self._storage.unit
-        unit_pixels = unit_height * unit_width
-        columns = unit_width * min(-(-self.width // unit_width), max(1, max_pixels // unit_pixels))
-        rows = unit_height * max(1, max_pixels // (unit_height * columns))
-        for y0 in range(0, self.height, rows):
-            for x0 in range(0, self.width, columns):
-                height, width = min(rows, self.height - y0), min(columns, self.width - x0)
-                stored = self._storage.read(y0, x0, height, width)
-                if self._must_show:
-                    self._check_range(stored, y0, x0)
-                yield Block(y0, x0, self._values(stored))
+        stored = self._storage.read(*place)
+        if self._must_show:
+            self._check_range(stored, place)
+        return Block(place.y0, place.x0, self._values(stored))
 
     def _values(self, stored: Array) -> Array:
         if self._one != 1:
@@ -158,12 +173,15 @@ class TiffSource:
         with np.errstate(over="ignore"):
             return stored.astype(np.float32, copy=False)
 
-    def _check_range(self, stored: Array, y0: int, x0: int) -> None:
+    def _check_range(self, stored: Array, place: Place) -> None:
+        # Two passes in nearly every case; NaN compares false and is looked at closely.
+        if stored.min() >= 0 and stored.max() <= 1:
+            return
         outside = ((stored < 0) | (stored > 1)) & np.isfinite(stored)
         if outside.any():
             y, x, channel = np.argwhere(outside)[0]
             raise InputError(
-                f"{self._path}: row {y0 + y}, column {x0 + x}, channel {channel} is "
+                f"{self._path}: row {place.y0 + y}, column {place.x0 + x}, channel {channel} is "
                 f"{float(stored[y, x, channel]):.9g}, but device values are in 0..1, and the file does not "
                 "say what its samples mean; if they are physical values as they are, declare it: "
                 "--samples real (samples='real' in Python)"

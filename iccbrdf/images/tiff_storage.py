@@ -3,11 +3,13 @@
 The parsing of the file and the decoding of compressed segments are tifffile's (with imagecodecs).
 Uncompressed pixels are read from their place, so that even a file in one piece needs no memory for more
 than the rectangle; a compressed segment can only be decoded as a whole, and one that is too large is refused.
+Several threads may read at a time.
 """
 
 from __future__ import annotations
 
 import os
+import threading
 from operator import index
 from typing import Any
 
@@ -59,6 +61,7 @@ class TiffStorage:
         # Whatever its parsing of a damaged file runs into leaves tifffile as it is.
         except Exception as error:
             raise InputError(f"{path}: not a readable TIFF: {error}") from error
+        self._seeking = threading.Lock()
         try:
             self._parse()
         except IccBrdfError:
@@ -100,6 +103,8 @@ class TiffStorage:
         self._offsets = [index(offset) for offset in page.dataoffsets]
         self._counts = [index(count) for count in page.databytecounts]
         self._check_segments()
+        if self._in_place:
+            self._join_strips()
 
     def _check_segments(self) -> None:
         path, grid = self._path, self._grid
@@ -138,36 +143,64 @@ class TiffStorage:
                 "save the file uncompressed, or with smaller strips or tiles"
             )
 
+    def _join_strips(self) -> None:
+        """Take strips that follow each other without a gap for one, so that rows are read at one go."""
+        grid = self._grid
+        strip_bytes = grid.segment_height * self.width * self._pixel_bytes
+        first = self._offsets[:: grid.segments]
+        joined = [start + i * strip_bytes for start in first for i in range(grid.segments)]
+        if self._page.is_tiled or 0 in self._counts or self._offsets != joined:
+            return
+        self._grid = Grid(self.height, self.width, self.height, self.width)
+        self._offsets = first
+
     def read(self, y0: int, x0: int, height: int, width: int) -> Array:
-        """A rectangle of pixels, shape (height, width, channels), in the file's sample type."""
-        # Segments that a sparse file leaves out are zero, as other readers have it.
-        pixels = np.zeros((height, width, self.channels), self.dtype)
-        for plane in range(self._planes):
-            target = pixels if self._planes == 1 else pixels[:, :, plane : plane + 1]
+        """A rectangle of pixels, shape (height, width, channels), in the file's sample type.
+
+        Pixels of a planar file stay plane by plane in memory.
+        """
+        pixels = np.empty((self._planes, height, width, self.channels // self._planes), self.dtype)
+        for plane, target in enumerate(pixels):
             for part in self._grid.parts(y0, x0, height, width):
                 segment = plane * self._grid.segments + part.segment
                 if self._counts[segment] == 0:
-                    continue
-                if self._in_place:
+                    # Segments that a sparse file leaves out are zero, as other readers have it.
+                    target[part.in_region] = 0
+                elif self._in_place:
                     for start, rows in self._grid.runs(part):
-                        run = target[rows, part.in_region[1]]
-                        data = self._bytes(self._offsets[segment] + start * self._pixel_bytes, run.nbytes)
-                        run[...] = np.frombuffer(data, self.dtype).reshape(run.shape)
+                        offset = self._offsets[segment] + start * self._pixel_bytes
+                        self._read_into(target[rows, part.in_region[1]], offset)
                 else:
                     target[part.in_region] = self._decoded(segment)[part.in_segment]
-        return pixels
+        return pixels[0] if self._planes == 1 else np.moveaxis(pixels[..., 0], 0, 2)
 
-    def _bytes(self, offset: int, count: int) -> bytes:
-        self._file.filehandle.seek(offset)
-        data: bytes = self._file.filehandle.read(count)
-        if len(data) != count:
-            raise InputError(f"{self._path}: truncated: no {count} bytes at byte {offset}")
-        return data
+    def _read_into(self, target: Array, offset: int) -> None:
+        if not target.flags.c_contiguous:
+            pixels = np.empty(target.shape, target.dtype)
+            self._read_into(pixels, offset)
+            target[...] = pixels
+            return
+        left = target.reshape(-1).view(np.uint8).data
+        while left:
+            # A system may give less than it was asked for: Linux at most 2 GiB.
+            count = self._read_at(offset, left)
+            if not count:
+                raise InputError(f"{self._path}: truncated: no {len(left)} bytes at byte {offset}")
+            left, offset = left[count:], offset + count
+
+    def _read_at(self, offset: int, buffer: memoryview) -> int:
+        if hasattr(os, "preadv"):
+            return os.preadv(self._file.filehandle.fileno(), [buffer], offset)
+        with self._seeking:
+            self._file.filehandle.seek(offset)
+            count: int = self._file.filehandle.readinto(buffer)
+            return count
 
     def _decoded(self, segment: int) -> Array:
-        data = self._bytes(self._offsets[segment], self._counts[segment])
+        data = np.empty(self._counts[segment], np.uint8)
+        self._read_into(data, self._offsets[segment])
         try:
-            pixels: Array = self._page.decode(data, segment, jpegtables=self._page.jpegtables)[0][0]
+            pixels: Array = self._page.decode(data.tobytes(), segment, jpegtables=self._page.jpegtables)[0][0]
         # Every codec has an exception of its own.
         except Exception as error:
             raise InputError(f"{self._path}: segment {segment} cannot be decoded: {error}") from error

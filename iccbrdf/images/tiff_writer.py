@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import imagecodecs
 import numpy as np
@@ -20,6 +20,7 @@ import tifffile
 from iccbrdf.errors import UsageError, nearest
 from iccbrdf.files import StrPath, atomic_output
 from iccbrdf.images.blocks import Array, Assembler, Block, Coverage, Grid
+from iccbrdf.images.in_order import in_order
 from iccbrdf.images.record import SAMPLES, U1_15, U1_15_ONE, Record, Samples
 
 SampleType = Literal["float32", "uint16", "uint8"]
@@ -32,14 +33,19 @@ _DTYPES: dict[str, np.dtype[Any]] = {
     "uint8": np.dtype("u1"),
 }
 
-_COMPRESSORS: dict[str, Callable[[bytes], bytes | bytearray]] = {
-    "deflate": imagecodecs.zlib_encode,
-    "zstd": imagecodecs.zstd_encode,
-}
+_COMPRESSORS = {"deflate": "zlib_encode", "zstd": "zstd_encode"}
+"""Functions of imagecodecs, which loads the code of each when it is first asked for."""
 
 _STRIP_BYTES = 1 << 18
 # A classic TIFF counts bytes in 32 bits; the rest is room for the tags and the segment tables.
 _CLASSIC_BYTES = (1 << 32) - (1 << 25)
+
+
+class Encoded(NamedTuple):
+    """A block in the samples of the file, and how many of them did not fit."""
+
+    block: Block
+    clipped: int
 
 
 class TiffSink:
@@ -60,23 +66,30 @@ class TiffSink:
 
     def write(self, block: Block) -> None:
         """Write a block of floats, shape (height, width, channels); UsageError where it does not fit."""
-        self._coverage.add(block)
-        self._put(block._replace(data=self._stored(block.data)))
+        self.put(self.encode(block))
+
+    def encode(self, block: Block) -> Encoded:
+        """The part of `write` that any thread may do, for several blocks at a time; the rest is `put`."""
+        self._coverage.check(block)
+        if self._dtype.kind == "f":
+            return Encoded(block._replace(data=np.asarray(block.data, self._dtype)), 0)
+        with np.errstate(over="ignore"):
+            scaled = np.rint(block.data * np.float32(self._one))
+        largest = np.iinfo(self._dtype).max
+        # NaN compares false, and so counts as not fitting.
+        clipped = scaled.size - int(np.count_nonzero((scaled >= 0) & (scaled <= largest)))
+        stored: Array = np.nan_to_num(scaled.clip(0, largest), copy=False).astype(self._dtype)
+        return Encoded(block._replace(data=stored), clipped)
+
+    def put(self, encoded: Encoded) -> None:
+        """Write what `encode` gave, in row order."""
+        self._coverage.count(encoded.block)
+        self._put(encoded.block)
+        self.clipped += encoded.clipped
 
     def finish(self) -> None:
         """UsageError where pixels are missing."""
         self._coverage.check_filled()
-
-    def _stored(self, data: Array) -> Array:
-        if self._dtype.kind == "f":
-            return np.asarray(data, self._dtype)
-        with np.errstate(over="ignore"):
-            scaled = np.rint(data * np.float32(self._one))
-        largest = np.iinfo(self._dtype).max
-        # NaN compares false, and so counts as not fitting.
-        self.clipped += scaled.size - int(np.count_nonzero((scaled >= 0) & (scaled <= largest)))
-        stored: Array = np.nan_to_num(scaled.clip(0, largest), copy=False).astype(self._dtype)
-        return stored
 
 
 @contextmanager
@@ -93,6 +106,7 @@ def create_tiff(
     compression: Compression | None = None,
     profile: bytes | None = None,
     overwrite: bool = False,
+    workers: int = 1,
 ) -> Iterator[TiffSink]:
     """Write a TIFF: a context manager that gives a sink, to be given blocks in row order.
 
@@ -114,6 +128,8 @@ def create_tiff(
         None for strips of about 256 KB.
     profile
         An ICC profile to embed (tag 34675).
+    workers
+        Threads that compress.
 
     Raises
     ------
@@ -156,7 +172,7 @@ def create_tiff(
         if compression is None:
             layout = _in_place(temporary, grid, channels, stored, tags)
         else:
-            layout = _compressed(temporary, grid, channels, stored, tags, compression)
+            layout = _compressed(temporary, grid, channels, stored, tags, compression, workers)
         coverage = Coverage(path, height, width, channels)
         one = U1_15_ONE if xyz else 1 if dtype == "float32" else np.iinfo(stored).max
         with layout as put:
@@ -213,6 +229,9 @@ def _in_place(
         writer.write(None, **tags)
     with tifffile.TiffFile(temporary) as laid_out:
         offsets = laid_out.pages[0].dataoffsets
+    if not tags["tile"]:
+        # The strips of a new file follow each other: taken for one, rows are written at one go.
+        grid = Grid(grid.height, grid.width, grid.height, grid.width)
     with temporary.open("r+b") as file:
 
         def put(block: Block) -> None:
@@ -220,30 +239,45 @@ def _in_place(
             for part in grid.parts(block.y0, block.x0, height, width):
                 for start, rows in grid.runs(part):
                     file.seek(offsets[part.segment] + start * pixel_bytes)
-                    file.write(block.data[rows, part.in_region[1]].tobytes())
+                    file.write(np.ascontiguousarray(block.data[rows, part.in_region[1]]).data)
 
         yield put
 
 
 @contextmanager
 def _compressed(
-    temporary: Path, grid: Grid, channels: int, dtype: np.dtype[Any], tags: dict[str, Any], compression: str
+    temporary: Path,
+    grid: Grid,
+    channels: int,
+    dtype: np.dtype[Any],
+    tags: dict[str, Any],
+    compression: str,
+    workers: int,
 ) -> Iterator[Put]:
     assembler = Assembler(grid, channels, dtype)
-    compress = _COMPRESSORS[compression]
+    compress = getattr(imagecodecs, _COMPRESSORS[compression])
     places: dict[int, tuple[int, int]] = {}
+
+    def encode(segment: int, pixels: Array) -> tuple[int, bytes | bytearray]:
+        if tags["tile"]:
+            below, beside = (side - n for side, n in zip(tags["tile"], pixels.shape[:2], strict=True))
+            pixels = np.pad(pixels, ((0, below), (0, beside), (0, 0)))
+        return segment, compress(pixels.tobytes())
+
     with tempfile.TemporaryFile(dir=temporary.parent) as spool:
 
-        def put(block: Block) -> None:
-            for segment, pixels in assembler.add(block):
-                if tags["tile"]:
-                    below, beside = (side - n for side, n in zip(tags["tile"], pixels.shape[:2], strict=True))
-                    pixels = np.pad(pixels, ((0, below), (0, beside), (0, 0)))
-                data = compress(pixels.tobytes())
-                places[segment] = spool.tell(), len(data)
-                spool.write(data)
+        def keep(encoded: tuple[int, bytes | bytearray]) -> None:
+            segment, data = encoded
+            places[segment] = spool.tell(), len(data)
+            spool.write(data)
 
-        yield put
+        with in_order(workers, keep) as submit:
+
+            def put(block: Block) -> None:
+                for segment, pixels in assembler.add(block):
+                    submit(encode, segment, pixels)
+
+            yield put
 
         def segments() -> Iterator[bytes]:
             for segment in range(grid.segments):

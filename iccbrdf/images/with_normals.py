@@ -9,7 +9,7 @@ import numpy as np
 
 from iccbrdf.brdf.models import NORMAL
 from iccbrdf.errors import InputError, UsageError
-from iccbrdf.images.blocks import Array, Block
+from iccbrdf.images.blocks import Array, Block, Place
 from iccbrdf.images.record import Samples
 
 
@@ -25,8 +25,11 @@ class ImageSource(Protocol):
     def names(self) -> Sequence[str] | None:
         """The channels' names, where they are known."""
 
-    def blocks(self, max_pixels: int = ...) -> Iterator[Block]:
-        """The image in row order."""
+    def places(self) -> Iterator[Place]:
+        """Where the blocks of the image lie, in row order."""
+
+    def read(self, place: Place) -> Block:
+        """The block at a place; several threads may read at a time."""
 
 
 class WithNormals:
@@ -65,10 +68,14 @@ class WithNormals:
         self.samples = source.samples
         self.names: Sequence[str] | None = (*names, *NORMAL)
 
-    def blocks(self, max_pixels: int = 1 << 18) -> Iterator[Block]:
-        """The blocks of the image, with the normals of their pixels."""
-        for block in self._source.blocks(max_pixels):
-            height, width, _ = block.data.shape
-            normals = self._normals[block.y0 : block.y0 + height, block.x0 : block.x0 + width]
-            encoded = (normals + 1) / 2 if self.samples == "device" else normals
-            yield block._replace(data=np.concatenate([block.data, encoded], axis=2, dtype=np.float32))
+    def places(self) -> Iterator[Place]:
+        """The places of the image."""
+        return self._source.places()
+
+    def read(self, place: Place) -> Block:
+        """A block of the image, with the normals of its pixels."""
+        block = self._source.read(place)
+        y0, x0, height, width = place
+        normals = self._normals[y0 : y0 + height, x0 : x0 + width]
+        encoded = (normals + 1) / 2 if self.samples == "device" else normals
+        return block._replace(data=np.concatenate([block.data, encoded], axis=2, dtype=np.float32))
