@@ -140,8 +140,8 @@ EXAMPLES = {
         """,
     ),
     "unknown": (
-        UnknownElement("XtoJ", bytes(4), 3, 3, b"anything"),
-        "58746f4a 00000000 0003 0003 616e797468696e67",
+        UnknownElement("smet", bytes(4), 3, 3, b"anything"),
+        "736d6574 00000000 0003 0003 616e797468696e67",
     ),
 }
 

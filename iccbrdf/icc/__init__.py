@@ -1,5 +1,7 @@
 """The ICC.2 file format: bytes to objects and back.  Knows no BRDF and runs nothing."""
 
+from iccbrdf.icc.appearance import JabToXYZ, XYZToJab
+from iccbrdf.icc.composite import Dictionary, Entry, Member, TagStruct
 from iccbrdf.icc.curves import (
     CURVES,
     SEGMENTS,
@@ -12,16 +14,21 @@ from iccbrdf.icc.curves import (
 )
 from iccbrdf.icc.elements import (
     ELEMENTS,
+    BeginAlternateSpace,
     Calculator,
     Clut,
+    EndAlternateSpace,
     ExtendedClut,
     Matrix,
     MultiProcess,
     TintArray,
     UnknownElement,
 )
+from iccbrdf.icc.gamut import GamutBoundary
 from iccbrdf.icc.header import D50, MCS_SUBSET, Header, channel_count
 from iccbrdf.icc.lut import Curve, LutAToB, LutBToA, ParametricCurve
+from iccbrdf.icc.lut_tables import Lut8, Lut16
+from iccbrdf.icc.packed import CompressedUtf8, CompressedXml, HeightImage, NormalImage
 from iccbrdf.icc.profile import (
     MissingTagError,
     Profile,
@@ -29,11 +36,21 @@ from iccbrdf.icc.profile import (
     read_profile,
     write_profile,
 )
+from iccbrdf.icc.spectral import (
+    EmissionClut,
+    EmissionMatrix,
+    EmissionObserver,
+    InverseEmissionMatrix,
+    ReflectanceClut,
+    ReflectanceObserver,
+    SpectralDataInfo,
+)
 from iccbrdf.icc.tags import (
     TAGS,
     XYZ,
     Colorant,
     ColorantTable,
+    DateTime,
     LocalisedText,
     Mluc,
     NumberArray,
@@ -42,9 +59,12 @@ from iccbrdf.icc.tags import (
     TagArray,
     Unknown,
     Utf8,
+    Utf16,
+    VideoCodePoints,
     ViewingConditions,
 )
 from iccbrdf.icc.text import describe, to_dict
+from iccbrdf.icc.tone import ToneFunction, ToneMap
 
 __all__ = [
     "CURVES",
@@ -54,37 +74,64 @@ __all__ = [
     "SEGMENTS",
     "TAGS",
     "XYZ",
+    "BeginAlternateSpace",
     "Calculator",
     "Clut",
     "Colorant",
     "ColorantTable",
+    "CompressedUtf8",
+    "CompressedXml",
     "Curve",
     "CurveSet",
+    "DateTime",
+    "Dictionary",
+    "EmissionClut",
+    "EmissionMatrix",
+    "EmissionObserver",
+    "EndAlternateSpace",
+    "Entry",
     "ExtendedClut",
     "FormulaSegment",
+    "GamutBoundary",
     "Header",
+    "HeightImage",
+    "InverseEmissionMatrix",
+    "JabToXYZ",
     "LocalisedText",
+    "Lut8",
+    "Lut16",
     "LutAToB",
     "LutBToA",
     "Matrix",
+    "Member",
     "MissingTagError",
     "Mluc",
     "MultiProcess",
+    "NormalImage",
     "NumberArray",
     "ParametricCurve",
     "PlainText",
     "Profile",
+    "ReflectanceClut",
+    "ReflectanceObserver",
     "SampledCalculatorCurve",
     "SampledCurve",
     "SampledSegment",
     "SegmentedCurve",
     "SignatureTag",
+    "SpectralDataInfo",
     "TagArray",
+    "TagStruct",
     "TintArray",
+    "ToneFunction",
+    "ToneMap",
     "Unknown",
     "UnknownElement",
     "Utf8",
+    "Utf16",
+    "VideoCodePoints",
     "ViewingConditions",
+    "XYZToJab",
     "channel_count",
     "compute_profile_id",
     "describe",

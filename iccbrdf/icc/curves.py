@@ -25,6 +25,7 @@ from iccbrdf.icc.fields import (
     tag_layout,
 )
 from iccbrdf.icc.layout import Field, Record, Registry
+from iccbrdf.icc.tags import TAGS
 
 CURVES = Registry("curve")
 SEGMENTS = Registry("curve segment")
@@ -83,13 +84,14 @@ class SampledSegment(Record):
             raise ValueError(f"values: found shape {self.values.shape}, expected at least one in a row")
 
 
+@TAGS.add("curf")
 @CURVES.add("curf")
 @dataclass(frozen=True, eq=False)
 class SegmentedCurve(Record):
     """Segments between break points: the first from minus infinity, the last to infinity.
 
-    A break point belongs to the segment on its left.  `breakpoints` are finite and increase strictly, one
-    fewer than the `segments`; the first and the last segment are formulas.
+    As a tag, segmentedCurveType.  A break point belongs to the segment on its left.  `breakpoints` are
+    finite and increase strictly, one fewer than the `segments`; the first and the last segment are formulas.
     """
 
     breakpoints: tuple[float, ...]

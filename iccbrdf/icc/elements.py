@@ -134,7 +134,7 @@ class Matrix(Record):
             )
 
 
-class _Grid(FieldType):
+class Grid(FieldType):
     """Sixteen bytes: the grid points of each input, then unused ones."""
 
     def read(self, reader: Reader, name: str, seen: Seen) -> tuple[int, ...]:
@@ -154,7 +154,7 @@ def _clut_layout(signature: str, *encoding: Any) -> Layout:
         Field("inputs", U16, derived=lambda r: r.inputs, valid=range(1, 17)),
         Field("outputs", U16, derived=lambda r: r.outputs, valid=range(1, 65536)),
         *encoding,
-        Field("grid", _Grid(), derived=lambda r: r.table.shape[:-1]),
+        Field("grid", Grid(), derived=lambda r: r.table.shape[:-1]),
         Field("table", Floats(lambda seen: (*seen["grid"], seen["outputs"]))),
         exact=True,
     )
@@ -332,6 +332,59 @@ class Calculator(Record):
     def check(self) -> None:
         object.__setattr__(self, "program", tuple(self.program))
         object.__setattr__(self, "elements", tuple(ELEMENTS.check(e) for e in self.elements))
+
+
+def _marker_layout(signature: str) -> Layout:
+    return tag_layout(
+        signature,
+        Field("channels", U16),
+        Field("outputs", U16, derived=lambda r: r.outputs),
+        Field("encoding", SIGNATURE),
+        Field("data", Bytes()),
+    )
+
+
+class _Marker(Record):
+    """What the two alternate connection space elements share: they pass `channels` channels on.
+
+    `encoding` names the space that stands between a beginning and an end; `data` may tell more about it.
+    """
+
+    channels: int
+
+    @property
+    def inputs(self) -> int:
+        return self.channels
+
+    @property
+    def outputs(self) -> int:
+        return self.channels
+
+
+@ELEMENTS.add("bACS")
+@dataclass(frozen=True, eq=False)
+class BeginAlternateSpace(_Marker):
+    """Marks where an alternate connection space begins."""
+
+    channels: int
+    encoding: str
+    data: bytes = b""
+
+    signature = "bACS"
+    layout = _marker_layout(signature)
+
+
+@ELEMENTS.add("eACS")
+@dataclass(frozen=True, eq=False)
+class EndAlternateSpace(_Marker):
+    """Marks where an alternate connection space ends."""
+
+    channels: int
+    encoding: str
+    data: bytes = b""
+
+    signature = "eACS"
+    layout = _marker_layout(signature)
 
 
 @TAGS.add("mpet")

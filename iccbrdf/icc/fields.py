@@ -237,23 +237,24 @@ ENCODINGS = ((">f4", 1), (">f2", 1), (">u2", 65535), (">u1", 255))
 class Floats(FieldType):
     """An array of float32 with the shape that the fields before it give, which fills the structure or less.
 
-    Where the structure has a field `encoding`, this holds how the values are stored: 0 float32, 1 float16,
-    2 uInt16 and 3 uInt8, which stand for 0..1.
+    `encoding` says how the values are stored: 0 float32, 1 float16, 2 uInt16 and 3 uInt8, which stand for
+    0..1; where the structure has a field of that name, this says it instead.
     """
 
-    def __init__(self, shape: Callable[[Seen], Sequence[int]]) -> None:
+    def __init__(self, shape: Callable[[Seen], Sequence[int]], encoding: int = 0) -> None:
         self.shape = shape
+        self.encoding = encoding
 
     def read(self, reader: Reader, name: str, seen: Seen) -> FloatArray:
         shape = tuple(self.shape(seen))
-        dtype, scale = ENCODINGS[seen.get("encoding", 0)]
+        dtype, scale = ENCODINGS[seen.get("encoding", self.encoding)]
         data = reader.take(math.prod(shape) * np.dtype(dtype).itemsize, name)
         with np.errstate(invalid="ignore"):  # a signalling NaN warns when it is widened
             values = np.frombuffer(data, dtype).astype(np.float32)
         return (values / np.float32(scale)).reshape(shape) if scale > 1 else values.reshape(shape)
 
     def write(self, out: bytearray, value: FloatArray, record: Any) -> None:
-        dtype, scale = ENCODINGS[getattr(record, "encoding", 0)]
+        dtype, scale = ENCODINGS[getattr(record, "encoding", self.encoding)]
         if scale > 1:
             value = np.rint(value.astype(np.float64) * scale)
         out += value.astype(dtype).tobytes()

@@ -23,6 +23,7 @@ PARAMETERS = {0: 1, 1: 3, 2: 4, 3: 5, 4: 7}
 """How many parameters the function of each type has."""
 
 
+@TAGS.add("curv")
 @LUT_CURVES.add("curv")
 @dataclass(frozen=True, eq=False)
 class Curve(Record):
@@ -38,6 +39,7 @@ class Curve(Record):
     )
 
 
+@TAGS.add("para")
 @LUT_CURVES.add("para")
 @dataclass(frozen=True, eq=False)
 class ParametricCurve(Record):

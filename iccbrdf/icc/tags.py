@@ -18,6 +18,7 @@ from iccbrdf.icc.fields import (
     F32,
     S15,
     SIGNATURE,
+    U8,
     U16,
     U32,
     Bytes,
@@ -72,6 +73,48 @@ class PlainText(Record):
 
     signature = "text"
     layout = tag_layout(signature, Field("text", Text("latin-1", end=b"\0")))
+
+
+@TAGS.add("ut16")
+@dataclass(frozen=True, eq=False)
+class Utf16(Record):
+    """utf16Type: UTF-16 text.  A NUL at its end, which some writers add, is dropped on reading."""
+
+    text: str
+
+    signature = "ut16"
+    layout = tag_layout(signature, Field("text", Text("utf-16-be")))
+
+
+@TAGS.add("dtim")
+@dataclass(frozen=True, eq=False)
+class DateTime(Record):
+    """dateTimeType: year, month, day, hours, minutes, seconds; UTC."""
+
+    value: tuple[int, int, int, int, int, int]
+
+    signature = "dtim"
+    layout = tag_layout(signature, Field("value", Repeat(U16, 6)))
+
+
+@TAGS.add("cicp")
+@dataclass(frozen=True, eq=False)
+class VideoCodePoints(Record):
+    """cicpType: the coding-independent code points of ITU-T H.273 that a video signal is described by."""
+
+    colour_primaries: int
+    transfer_characteristics: int
+    matrix_coefficients: int
+    full_range: int
+
+    signature = "cicp"
+    layout = tag_layout(
+        signature,
+        Field("colour_primaries", U8),
+        Field("transfer_characteristics", U8),
+        Field("matrix_coefficients", U8),
+        Field("full_range", U8),
+    )
 
 
 @TAGS.add("sig ")

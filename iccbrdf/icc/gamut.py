@@ -1,0 +1,68 @@
+"""The tag type of gamut boundaries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from iccbrdf.icc.fields import U16, U32, FloatArray, Floats, frozen, tag_layout
+from iccbrdf.icc.layout import Field, FieldType, Record, Seen
+from iccbrdf.icc.reader import Reader
+from iccbrdf.icc.tags import TAGS
+
+
+class _Triangles(FieldType):
+    """Three vertex numbers each."""
+
+    def read(self, reader: Reader, name: str, seen: Seen) -> npt.NDArray[np.uint32]:
+        data = reader.take(12 * seen["count"], f"{seen['count']} triangles")
+        return np.frombuffer(data, ">u4").reshape(-1, 3).astype(np.uint32)
+
+    def write(self, out: bytearray, value: npt.NDArray[np.uint32], record: Any) -> None:
+        out += value.astype(">u4").tobytes()
+
+    def normal(self, value: Any) -> npt.NDArray[np.uint32]:
+        return frozen(value, np.uint32)
+
+
+@TAGS.add("gbd ")
+@dataclass(frozen=True, eq=False)
+class GamutBoundary(Record):
+    """gamutBoundaryDescType: a surface of triangles around the colours that a device can make.
+
+    triangles : shape (T, 3), numbers of vertices
+    pcs : shape (V, PCS channels), the vertices in the connection space
+    device : shape (V, device channels), the same as device values; no columns where they are not told
+    """
+
+    triangles: npt.NDArray[np.uint32]
+    pcs: FloatArray
+    device: FloatArray
+
+    signature = "gbd "
+    layout = tag_layout(
+        signature,
+        Field("pcs_channels", U16, derived=lambda r: r.pcs.shape[1]),
+        Field("device_channels", U16, derived=lambda r: r.device.shape[1]),
+        Field("vertices", U32, derived=lambda r: len(r.pcs)),
+        Field("count", U32, derived=lambda r: len(r.triangles)),
+        Field("triangles", _Triangles()),
+        Field("pcs", Floats(lambda seen: (seen["vertices"], seen["pcs_channels"]))),
+        Field("device", Floats(lambda seen: (seen["vertices"], seen["device_channels"]))),
+    )
+
+    def check(self) -> None:
+        if self.pcs.ndim != 2 or self.device.ndim != 2 or len(self.pcs) != len(self.device):
+            raise ValueError(
+                f"found vertices of shape {self.pcs.shape} and {self.device.shape}, "
+                "expected rows of channels, as many in both"
+            )
+        if self.triangles.ndim != 2 or self.triangles.shape[1] != 3:
+            raise ValueError(f"triangles: found shape {self.triangles.shape}, expected (count, 3)")
+        if self.triangles.size and int(self.triangles.max()) >= len(self.pcs):
+            raise ValueError(
+                f"triangles: found vertex {self.triangles.max()}, expected less than {len(self.pcs)}"
+            )
