@@ -14,7 +14,7 @@ import iccbrdf
 from iccbrdf.brdf.primaries import read_primaries
 from iccbrdf.build.pair import build_pair
 from iccbrdf.calc.program import Op
-from iccbrdf.cmm.transform import MAX_VALUES, TILE
+from iccbrdf.cmm.execution import MAX_VALUES, TILE
 from iccbrdf.errors import IccBrdfError, InputError, LimitError, ProfileError, UnsupportedError, VariableError
 from iccbrdf.icc import Calculator, Header, Matrix, MultiProcess, NumberArray, Profile, UnknownElement
 from iccbrdf.resources import folder
@@ -135,10 +135,10 @@ def test_a_program_of_many_registers_runs_in_small_tiles():
     """The deepest stack that there may be, whose 65535 sums would take 4 GB on a full tile."""
     half = 32767
     deep = mid("a", program(f"in(0) copy(1,{2 * half - 1}) add({half}) sum({half}) out(0)", 1, 1))
-    transform = iccbrdf.link([deep])
+    transform = iccbrdf.link([deep], backend="interpreter")
     assert max(step.registers for step in transform.steps) == 2 * half
-    assert transform._tile_size() == MAX_VALUES // (2 * half)
-    count = transform._tile_size() + 3
+    assert transform.execution.tile == MAX_VALUES // (2 * half)
+    count = transform.execution.tile + 3
     assert np.array_equal(transform(np.ones((count, 1))), np.full((count, 1), 2 * half, np.float32))
 
 
@@ -150,7 +150,7 @@ def test_pickling(pair):
         again.with_env({"litX": 0.1})(device(20)), transform.with_env({"litX": 0.1})(device(20))
     )
     assert (again.channels_in, again.channels_out) == (transform.channels_in, transform.channels_out)
-    assert (again.env, again.threads, again.backend) == ({"litX": 0.3}, 2, "interpreter")
+    assert (again.env, again.threads, again.backend) == ({"litX": 0.3}, 2, transform.backend)
 
 
 # Run-time variables --------------------------------------------------------------------------------------

@@ -105,6 +105,15 @@ class Graph:
     def const(self, *values: float) -> Node:
         return self.add("const", detail=tuple(map(float, values)))
 
+    def number(self, value: float) -> Node:
+        """A constant, rounded to the graph's type."""
+        with np.errstate(over="ignore"):
+            return self.const(float(self.dtype(value)))
+
+    def apply(self, op: str, *arguments: Node) -> Node:
+        """An operator that has nothing but arguments."""
+        return self.add(op, arguments)
+
     def input(self, first: int, width: int = 1) -> Node:
         return self.add("input", detail=first, width=width)
 

@@ -13,8 +13,6 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
 
-import numpy as np
-
 from iccbrdf.calc.elements import calculator_samples
 from iccbrdf.calc.graph import LOGIC, Graph, Node, is_truth
 from iccbrdf.calc.meanings import EPSILON, KNEE, NEAR, OFFSET, SLOPE
@@ -73,12 +71,10 @@ class _Lift:
         return function(self, element, channels)
 
     def number(self, value: float) -> Node:
-        """A constant, rounded to the working type."""
-        with np.errstate(over="ignore"):
-            return self.graph.const(float(self.graph.dtype(value)))
+        return self.graph.number(value)
 
     def op(self, op: str, *arguments: Node) -> Node:
-        return self.graph.add(op, arguments)
+        return self.graph.apply(op, *arguments)
 
     def truth(self, value: Node) -> Node:
         """A value as a condition: 0.5 and above; NaN is false."""

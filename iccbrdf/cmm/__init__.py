@@ -1,6 +1,7 @@
 """Profiles -> a Transform: routing by channel name, connection spaces and conditions, environment."""
 
-from iccbrdf.cmm.link import BACKENDS, link
+from iccbrdf.cmm.execution import BACKENDS
+from iccbrdf.cmm.link import link
 from iccbrdf.cmm.stages import INTENTS
 from iccbrdf.cmm.standard import standard_XYZ
 from iccbrdf.cmm.transform import Transform

@@ -31,6 +31,6 @@ def standard_XYZ(profile: Profile, dtype: type[np.floating[Any]] = np.float32) -
         variables=(),
         env={},
         dtype=dtype,
-        backend="interpreter",
+        wanted="auto",
         threads=1,
     )

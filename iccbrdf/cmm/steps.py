@@ -13,6 +13,8 @@ import numpy as np
 
 from iccbrdf.calc.elements import SIGNATURES
 from iccbrdf.calc.elements import apply as apply_element
+from iccbrdf.calc.graph import Graph, Node
+from iccbrdf.calc.lift import lift_element
 from iccbrdf.calc.verify import verify_element
 from iccbrdf.cmm.environment import RESERVED
 from iccbrdf.errors import ProfileError, UnsupportedError, nearest
@@ -23,9 +25,11 @@ Channel = Any
 
 
 class Step(Protocol):
-    """What a transform runs."""
+    """What a transform runs: `apply` is the definition, `lift` the same as nodes of a graph."""
 
     def apply(self, channels: Sequence[Channel], env: Mapping[str, float], dtype: Any) -> list[Channel]: ...
+
+    def lift(self, graph: Graph, channels: Sequence[Node], *, finite_inputs: bool) -> list[Node]: ...
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,11 @@ class Process:
             channels = apply_element(element, channels, env=env, dtype=dtype)
         return list(channels)
 
+    def lift(self, graph: Graph, channels: Sequence[Node], *, finite_inputs: bool) -> list[Node]:
+        for element in self.elements:
+            channels = lift_element(graph, element, channels, finite_inputs=finite_inputs)
+        return list(channels)
+
 
 def _check_runnable(element: Any, place: str) -> None:
     """Is every element known here, those inside of calculators too, and does it have channels?"""
@@ -88,6 +97,12 @@ class Route:
             for source, default in zip(self.sources, self.defaults, strict=True)
         ]
 
+    def lift(self, graph: Graph, channels: Sequence[Node], *, finite_inputs: bool) -> list[Node]:
+        return [
+            graph.number(default) if source is None else channels[source]
+            for source, default in zip(self.sources, self.defaults, strict=True)
+        ]
+
 
 @dataclass(frozen=True)
 class Scale:
@@ -97,6 +112,10 @@ class Scale:
 
     def apply(self, channels: Sequence[Channel], env: Mapping[str, float], dtype: Any) -> list[Channel]:
         return [channel * dtype(factor) for channel, factor in zip(channels, self.factors, strict=True)]
+
+    def lift(self, graph: Graph, channels: Sequence[Node], *, finite_inputs: bool) -> list[Node]:
+        factors = map(graph.number, self.factors)
+        return [graph.add("mul", pair) for pair in zip(channels, factors, strict=True)]
 
 
 # CIE 15:2018, 8.2.1: the cube root gives way to a line below (6/29)^3.
@@ -115,6 +134,21 @@ class XYZToLab:
         x, y, z = (np.where(t > _EPSILON, np.cbrt(t), t * dtype(_SLOPE) + dtype(4 / 29)) for t in ratios)
         return [dtype(116) * y - dtype(16), dtype(500) * (x - y), dtype(200) * (y - z)]
 
+    def lift(self, graph: Graph, channels: Sequence[Node], *, finite_inputs: bool) -> list[Node]:
+        op, number = graph.apply, graph.number
+
+        def f(channel: Node, white: float) -> Node:
+            t = op("div", channel, number(white))
+            line = op("add", op("mul", t, number(_SLOPE)), number(4 / 29))
+            return op("select", op("gt", t, number(_EPSILON)), op("cbrt", t), line)
+
+        x, y, z = (f(channel, white) for channel, white in zip(channels, self.white, strict=True))
+        return [
+            op("sub", op("mul", number(116), y), number(16)),
+            op("mul", number(500), op("sub", x, y)),
+            op("mul", number(200), op("sub", y, z)),
+        ]
+
 
 @dataclass(frozen=True)
 class LabToXYZ:
@@ -127,6 +161,21 @@ class LabToXYZ:
         y = (lightness + dtype(16)) / dtype(116)
         roots = (y + a / dtype(500), y, y - b / dtype(200))
         return [
-            dtype(w) * np.where(f > 6 / 29, f**3, (f - dtype(4 / 29)) / dtype(_SLOPE))
+            dtype(w) * np.where(f > 6 / 29, f * f * f, (f - dtype(4 / 29)) / dtype(_SLOPE))
             for f, w in zip(roots, self.white, strict=True)
         ]
+
+    def lift(self, graph: Graph, channels: Sequence[Node], *, finite_inputs: bool) -> list[Node]:
+        op, number = graph.apply, graph.number
+        lightness, a, b = channels
+        y = op("div", op("add", lightness, number(16)), number(116))
+
+        def inverse(f: Node, white: float) -> Node:
+            cube = op("mul", op("mul", f, f), f)
+            line = op("div", op("sub", f, number(4 / 29)), number(_SLOPE))
+            ratio = op("select", op("gt", f, number(6 / 29)), cube, line)
+            return op("mul", number(white), ratio)
+
+        x = op("add", y, op("div", a, number(500)))
+        z = op("sub", y, op("div", b, number(200)))
+        return [inverse(f, white) for f, white in zip((x, y, z), self.white, strict=True)]

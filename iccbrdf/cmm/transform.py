@@ -11,13 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from iccbrdf.cmm.environment import checked_environment
-from iccbrdf.cmm.steps import Process, Step
+from iccbrdf.cmm.execution import Execution, execution, parts
+from iccbrdf.cmm.steps import Step
 from iccbrdf.errors import InputError
-
-TILE = 16384
-"""Pixels a tile: the registers of a Cook-Torrance program on float32 tiles of this size stay within L2."""
-MAX_VALUES = 1 << 24
-"""Values of a tile at a time: programs may ask for so many registers that fewer pixels must do."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +35,19 @@ class Transform:
     """Names of the run-time variables that the profiles read."""
     env: Mapping[str, float]
     dtype: type[np.floating[Any]]
-    backend: str
+    wanted: str
+    """The back end that was asked for; `backend` is the one that runs."""
     threads: int
+
+    @property
+    def execution(self) -> Execution:
+        """What runs the chain, compiled when first asked for."""
+        return execution(self.steps, len(self.channels_in), np.dtype(self.dtype), self.wanted)
+
+    @property
+    def backend(self) -> str:
+        """The back end that runs the chain."""
+        return self.execution.backend
 
     def __call__(self, array: npt.ArrayLike) -> npt.NDArray[np.floating[Any]]:
         """`array` (..., channels in) through the chain, in the dtype of the transform.
@@ -61,31 +68,20 @@ class Transform:
             )
         flat = pixels.reshape(-1, len(self.channels_in))
         out = np.empty((len(flat), len(self.channels_out)), self.dtype)
-        size = self._tile_size()
-        starts = range(0, len(flat), size)
+        run = self.execution.bind(self.env)
 
-        def tile(start: int) -> None:
-            self._run(flat[start : start + size], out[start : start + size])
+        def quietly(piece: slice) -> None:
+            # What is infinite or not a number is a result like any other.
+            with np.errstate(all="ignore"):
+                run(flat[piece], out[piece])
 
-        if self.threads > 1 and len(starts) > 1:
+        pieces = parts(len(flat), self.threads)
+        if self.threads > 1 and len(pieces) > 1:
             with ThreadPoolExecutor(self.threads) as pool:
-                list(pool.map(tile, starts))
+                list(pool.map(quietly, pieces))
         else:
-            for start in starts:
-                tile(start)
+            quietly(slice(None))
         return out.reshape(*pixels.shape[:-1], len(self.channels_out))
-
-    def _run(self, pixels: npt.NDArray[Any], out: npt.NDArray[Any]) -> None:
-        with np.errstate(all="ignore"):
-            channels: list[Any] = list(np.ascontiguousarray(pixels.T, self.dtype))
-            for step in self.steps:
-                channels = step.apply(channels, self.env, self.dtype)
-        for i, channel in enumerate(channels):
-            out[:, i] = channel
-
-    def _tile_size(self) -> int:
-        registers = max((step.registers for step in self.steps if isinstance(step, Process)), default=1)
-        return max(1, min(TILE, MAX_VALUES // registers))
 
     def with_env(self, env: Mapping[str, float]) -> Transform:
         """The same chain under other run-time variables; those not named keep their value."""

@@ -1,0 +1,165 @@
+"""What runs a linked chain: a compiled back end on its graph, or the interpreter step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, lru_cache
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from iccbrdf.calc.backends import COMPILERS, Kernel
+from iccbrdf.calc.exact_passes import EXACT_PASSES
+from iccbrdf.calc.graph import Graph
+from iccbrdf.calc.passes import Report, optimise
+from iccbrdf.calc.schedule import Schedule, schedule, uniform_values
+from iccbrdf.cmm.steps import Process, Step
+from iccbrdf.errors import UnsupportedError
+
+BACKENDS = ("auto", "interpreter", *COMPILERS)
+
+TILE = 16384
+"""Pixels a tile: the registers of a Cook-Torrance program on float32 tiles of this size stay within L2."""
+MAX_VALUES = 1 << 24
+"""Values of a tile at a time: programs may ask for so many registers that fewer pixels must do."""
+
+Array: TypeAlias = npt.NDArray[Any]
+Run: TypeAlias = Callable[[Array, Array], None]
+"""Computes `out` (n, outputs) from `pixels` (n, inputs)."""
+
+
+class Execution(Protocol):
+    """A chain made ready to run."""
+
+    @property
+    def backend(self) -> str:
+        """The name of the back end."""
+
+    @property
+    def reason(self) -> str:
+        """Why it is this one."""
+
+    def bind(self, env: Mapping[str, float]) -> Run:
+        """The function that maps pixels under these run-time variables; threads may share it."""
+
+
+@lru_cache(maxsize=16)
+def execution(steps: tuple[Step, ...], channels: int, dtype: np.dtype[Any], wanted: str) -> Execution:
+    """
+    The execution of a chain of `channels` input channels by the back end `wanted`.
+
+    `auto` takes the quickest that can run the chain.
+
+    Raises
+    ------
+    UnsupportedError
+        The back end that is asked for is not installed, or cannot run the chain.
+    """
+    if wanted == "interpreter":
+        return Interpreted(steps, dtype, "it was asked for")
+    names = list(COMPILERS) if wanted == "auto" else [wanted]
+    refused: list[str] = []
+    for name in names:
+        try:
+            why = "it was asked for" if wanted == name else "; ".join(["the quickest that can run", *refused])
+            return Compiled(steps, channels, dtype, name, why)
+        except UnsupportedError as error:
+            refused.append(f"{name}: {error}")
+    if wanted != "auto":
+        raise UnsupportedError(f"back end {'; '.join(refused)}")
+    return Interpreted(steps, dtype, "; ".join(refused))
+
+
+class Interpreted:
+    """Step by step in the interpreter, which defines what a chain computes."""
+
+    backend = "interpreter"
+
+    def __init__(self, steps: tuple[Step, ...], dtype: np.dtype[Any], reason: str) -> None:
+        self.reason = reason
+        self._steps = steps
+        self._dtype = dtype
+        registers = max((step.registers for step in steps if isinstance(step, Process)), default=1)
+        self.tile = max(1, min(TILE, MAX_VALUES // registers))
+
+    def bind(self, env: Mapping[str, float]) -> Run:
+        def run(pixels: Array, out: Array) -> None:
+            for start in range(0, len(pixels), self.tile):
+                end = start + self.tile
+                channels: list[Any] = list(np.ascontiguousarray(pixels[start:end].T, self._dtype))
+                for step in self._steps:
+                    channels = step.apply(channels, env, self._dtype.type)
+                for i, channel in enumerate(channels):
+                    out[start:end, i] = channel
+
+        return run
+
+
+class Compiled:
+    """The chain as one graph, compiled.
+
+    `schedule` and `reports` (of the passes) tell what runs.  Matrices leave out what is multiplied by 0,
+    which is right for finite numbers; a tile in which one is not runs in a kernel that leaves nothing out,
+    made when the first such tile is met.
+    """
+
+    def __init__(
+        self,
+        steps: tuple[Step, ...],
+        channels: int,
+        dtype: np.dtype[Any],
+        backend: str,
+        reason: str,
+    ) -> None:
+        self.backend = backend
+        self.reason = reason
+        self._steps = steps
+        self._channels = channels
+        self._dtype = dtype
+        self.schedule, self.reports = self._lifted(finite_inputs=True)
+        self._finite = COMPILERS[backend](self.schedule)
+
+    def _lifted(self, *, finite_inputs: bool) -> tuple[Schedule, tuple[Report, ...]]:
+        graph = Graph(dtype=self._dtype.type)
+        nodes = [graph.input(i) for i in range(self._channels)]
+        for step in self._steps:
+            nodes = step.lift(graph, nodes, finite_inputs=finite_inputs)
+        graph.outputs = tuple(nodes)
+        graph, reports = optimise(graph, EXACT_PASSES)
+        return schedule(graph, self._channels), reports
+
+    @cached_property
+    def _any(self) -> tuple[Schedule, Kernel]:
+        """What runs where an input is not finite."""
+        plan, _ = self._lifted(finite_inputs=False)
+        if len(plan.graph.nodes) == len(self.schedule.graph.nodes):
+            return self.schedule, self._finite
+        return plan, COMPILERS[self.backend](plan)
+
+    def bind(self, env: Mapping[str, float]) -> Run:
+        arguments = uniform_values(self.schedule, env)
+
+        def run(pixels: Array, out: Array) -> None:
+            for start in range(0, len(pixels), TILE):
+                tile = np.ascontiguousarray(pixels[start : start + TILE], self._dtype)
+                if _all_finite(tile):
+                    self._finite.run(tile, out[start : start + TILE], arguments)
+                else:
+                    plan, kernel = self._any
+                    kernel.run(tile, out[start : start + TILE], uniform_values(plan, env))
+
+        return run
+
+
+def _all_finite(tile: Array) -> bool:
+    """Whether all numbers are; a sum that overflows is taken for one that is not, which does no harm."""
+    return math.isfinite(tile.sum())
+
+
+def parts(count: int, threads: int) -> Sequence[slice]:
+    """`count` pixels in pieces of whole tiles for so many threads, a few for each to even out."""
+    tiles = -(-count // TILE)
+    size = TILE * max(1, -(-tiles // (4 * threads)))
+    return [slice(start, min(start + size, count)) for start in range(0, count, size)]
