@@ -145,7 +145,7 @@ def test_impossible_requests(tmp_path):
     for size, options, message in (
         ((0, 3), {}, "a PNG of 0 x 3 pixels"),
         ((1, 2**31), {}, "a PNG of 1 x 2147483648 pixels"),
-        ((2, 3), {"depth": 12}, "12 bits per sample, a PNG has 8 or 16"),
+        ((2, 3), {"depth": 12}, "12 bits per sample, a picture has 8 or 16"),
         ((2, 3), {"exposure": 0.0}, "exposure 0.0, expected a positive factor"),
         ((2, 3), {"exposure": np.nan}, "exposure nan"),
     ):

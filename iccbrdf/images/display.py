@@ -1,31 +1,30 @@
-"""XYZ for the eye: through an sRGB display profile into a PNG, by Little CMS (imagecodecs)."""
+"""XYZ for the eye: pictures with the display's profile embedded, PNG and TIFF, written as blocks come."""
 
 from __future__ import annotations
 
-import functools
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import BinaryIO, Literal, NamedTuple
 
-import imagecodecs
 import numpy as np
+import tifffile
 
 from iccbrdf.errors import UsageError
 from iccbrdf.files import StrPath, atomic_output
 from iccbrdf.images.blocks import Array, Assembler, Block, Coverage, Grid
+from iccbrdf.images.little_cms import from_XYZ
 from iccbrdf.images.png import LONGEST_SIDE, PngWriter
+from iccbrdf.images.showing import Showing, finite, srgb
 
 _BAND_ROWS = 16
-# Little CMS turns infinities into black; beyond this value everything is white anyway.
-_BRIGHTEST = 1e6
+# A classic TIFF counts bytes in 32 bits; the rest is room for the tags and the segment tables.
+_CLASSIC_BYTES = (1 << 32) - (1 << 25)
 
 
-@functools.cache
 def srgb_profile() -> bytes:
-    """The sRGB display profile of Little CMS, dated 2000-01-01 so that it is the same on every day."""
-    profile = bytearray(imagecodecs.cms_profile("srgb"))
-    profile[24:36] = b"\x07\xd0\0\x01\0\x01" + bytes(6)
-    return bytes(profile)
+    """The profile of `iccbrdf.images.showing.srgb`, as the bytes of a file."""
+    return srgb().to_bytes()
 
 
 def xyz_to_srgb(xyz: Array) -> Array:
@@ -42,21 +41,11 @@ def xyz_to_srgb(xyz: Array) -> Array:
         float32, shape (height, width, 3), nominally 0..1, not clipped: colours outside the display's gamut
         lie outside.  The relative intent: (0.9642, 1, 0.8249) becomes (1, 1, 1).
     """
-    finite = np.nan_to_num(np.asarray(xyz, np.float32), posinf=_BRIGHTEST, neginf=-_BRIGHTEST)
-    rgb: Array = imagecodecs.cms_transform(
-        finite.clip(-_BRIGHTEST, _BRIGHTEST),
-        imagecodecs.cms_profile("xyz"),
-        srgb_profile(),
-        colorspace="xyz",
-        outcolorspace="rgb",
-        outdtype=np.float32,
-        intent=imagecodecs.CMS.INTENT.RELATIVE_COLORIMETRIC,
-    )
-    return rgb
+    return from_XYZ(finite(np.asarray(xyz, np.float32)), srgb())
 
 
 class Levels(NamedTuple):
-    """A block in the levels of the display, and how many of its pixels `PngSink` counts as what."""
+    """A block in the levels of the display, and how many of its pixels `PictureSink` counts as what."""
 
     block: Block
     above_white: int
@@ -64,33 +53,33 @@ class Levels(NamedTuple):
     not_finite: int
 
 
-class PngSink:
-    """A PNG that is being written.  See `create_png`.
+class PictureSink(ABC):
+    """A picture that is being written.  See `create_png` and `create_rgb_tiff`.
 
     Attributes
     ----------
     above_white
-        Pixels so far with a component above the display's largest, and so clipped.
+        Pixels so far that are brighter than the display's white.
     out_of_gamut
-        Pixels so far with a component below zero: colours more saturated than the display's.
+        Other pixels so far that the display shows in a colour that is noticeably another one.
     not_finite
         Pixels so far with NaN or an infinity.
     """
 
-    def __init__(
-        self, file: BinaryIO, path: StrPath, height: int, width: int, depth: int, exposure: float
-    ) -> None:
+    def __init__(self, path: StrPath, height: int, width: int, depth: int, showing: Showing) -> None:
         self._path = path
-        self._exposure = np.float32(exposure)
+        self._showing = showing
         self._largest = 2**depth - 1
         self._dtype = np.dtype(f"u{depth // 8}")
         self._coverage = Coverage(path, height, width, 3)
-        self._assembler = Assembler(Grid(height, width, _BAND_ROWS, width), 3, self._dtype)
-        self._writer = PngWriter(file, height, width, self._dtype, srgb_profile())
-        self._next_band = 0
         self.above_white = 0
         self.out_of_gamut = 0
         self.not_finite = 0
+
+    @property
+    def clipped(self) -> int:
+        """Pixels so far that are not shown as they are: out of gamut, or above white and not rolled off."""
+        return self.out_of_gamut + (self.above_white if self._showing.highlights == "clip" else 0)
 
     def write(self, block: Block) -> None:
         """Write a block of XYZ (D50, Y = 1 for white); UsageError where it does not fit or follow."""
@@ -99,19 +88,43 @@ class PngSink:
     def encode(self, block: Block) -> Levels:
         """The part of `write` that any thread may do, for several blocks at a time; the rest is `put`."""
         self._coverage.check(block)
-        not_finite = _pixels(~np.isfinite(block.data))
-        levels = np.rint(xyz_to_srgb(block.data * self._exposure) * self._largest)
-        above, outside = _pixels(levels > self._largest), _pixels(levels < 0)
-        pixels = levels.clip(0, self._largest).astype(self._dtype)
-        return Levels(block._replace(data=pixels), above, outside, not_finite)
+        shown = self._showing(block.data)
+        return Levels(
+            block._replace(data=np.rint(shown.device * self._largest).astype(self._dtype)),
+            above_white=int(np.count_nonzero(shown.above_white)),
+            out_of_gamut=int(np.count_nonzero(shown.out_of_gamut)),
+            not_finite=int(np.count_nonzero(~np.isfinite(block.data).all(axis=2))),
+        )
 
     def put(self, levels: Levels) -> None:
         """Write what `encode` gave; UsageError where it does not follow."""
-        block = levels.block
-        self._coverage.count(block)
+        self._coverage.count(levels.block)
         self.above_white += levels.above_white
         self.out_of_gamut += levels.out_of_gamut
         self.not_finite += levels.not_finite
+        self._put(levels.block)
+
+    def finish(self) -> None:
+        """Write what belongs after the last row; UsageError where rows are missing."""
+        self._coverage.check_filled()
+
+    @abstractmethod
+    def _put(self, block: Block) -> None:
+        """Write the samples of a block."""
+
+
+class PngSink(PictureSink):
+    """A PNG that is being written.  See `create_png`."""
+
+    def __init__(
+        self, file: BinaryIO, path: StrPath, height: int, width: int, depth: int, showing: Showing
+    ) -> None:
+        super().__init__(path, height, width, depth, showing)
+        self._assembler = Assembler(Grid(height, width, _BAND_ROWS, width), 3, self._dtype)
+        self._writer = PngWriter(file, height, width, self._dtype, showing.profile.to_bytes())
+        self._next_band = 0
+
+    def _put(self, block: Block) -> None:
         for band, rows in self._assembler.add(block):
             if band != self._next_band:
                 raise UsageError(
@@ -122,13 +135,22 @@ class PngSink:
             self._writer.write_rows(rows)
 
     def finish(self) -> None:
-        """Write what belongs after the last row; UsageError where rows are missing."""
-        self._coverage.check_filled()
+        super().finish()
         self._writer.finish()
 
 
-def _pixels(mask: Array) -> int:
-    return int(np.count_nonzero(mask.any(axis=2)))
+class RgbTiffSink(PictureSink):
+    """An RGB TIFF that is being written.  See `create_rgb_tiff`."""
+
+    def __init__(
+        self, pixels: Array, path: StrPath, height: int, width: int, depth: int, showing: Showing
+    ) -> None:
+        super().__init__(path, height, width, depth, showing)
+        self._pixels = pixels
+
+    def _put(self, block: Block) -> None:
+        height, width, _ = block.data.shape
+        self._pixels[block.y0 : block.y0 + height, block.x0 : block.x0 + width] = block.data
 
 
 @contextmanager
@@ -139,6 +161,7 @@ def create_png(
     *,
     depth: Literal[8, 16] = 8,
     exposure: float = 1.0,
+    showing: Showing | None = None,
     overwrite: bool = False,
 ) -> Iterator[PngSink]:
     """Write a picture: a context manager that gives a sink, to be given blocks of XYZ in row order.
@@ -152,6 +175,8 @@ def create_png(
         Bits per sample.
     exposure
         Factor on XYZ; above 1 for prints in dim light, below 1 to keep highlights from clipping.
+    showing
+        On which display and how, instead of on sRGB with `exposure`.
 
     Raises
     ------
@@ -161,13 +186,57 @@ def create_png(
     LimitError
         The disk is full.
     """
-    if min(height, width) < 1 or max(height, width) > LONGEST_SIDE:
-        raise UsageError(f"{path}: a PNG of {height} x {width} pixels, expected 1 to {LONGEST_SIDE} each way")
-    if depth not in (8, 16):
-        raise UsageError(f"{path}: {depth} bits per sample, a PNG has 8 or 16")
-    if not 0 < exposure < np.inf:
-        raise UsageError(f"{path}: exposure {exposure}, expected a positive factor")
+    _check("PNG", path, height, width, depth)
+    showing = showing or _on_srgb(path, exposure)
     with atomic_output(path, overwrite=overwrite) as temporary, temporary.open("wb") as file:
-        sink = PngSink(file, path, height, width, depth, exposure)
+        sink = PngSink(file, path, height, width, depth, showing)
         yield sink
         sink.finish()
+
+
+@contextmanager
+def create_rgb_tiff(
+    path: StrPath,
+    height: int,
+    width: int,
+    *,
+    depth: Literal[8, 16] = 8,
+    showing: Showing,
+    overwrite: bool = False,
+) -> Iterator[RgbTiffSink]:
+    """Write an uncompressed RGB TIFF, BigTIFF where it needs to be; otherwise as `create_png`."""
+    _check("TIFF", path, height, width, depth)
+    size = height * width * 3 * depth // 8
+    with atomic_output(path, overwrite=overwrite) as temporary:
+        pixels = tifffile.memmap(
+            temporary,
+            shape=(height, width, 3),
+            dtype=f"<u{depth // 8}",
+            photometric="rgb",
+            iccprofile=showing.profile.to_bytes(),
+            bigtiff=size > _CLASSIC_BYTES,
+            byteorder="<",
+            metadata=None,
+            description=None,
+            software="iccbrdf",
+        )
+        sink = RgbTiffSink(pixels, path, height, width, depth, showing)
+        yield sink
+        sink.finish()
+        pixels.flush()
+
+
+def _on_srgb(path: StrPath, exposure: float) -> Showing:
+    try:
+        return Showing(srgb(), exposure)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from None
+
+
+def _check(kind: str, path: StrPath, height: int, width: int, depth: int) -> None:
+    if min(height, width) < 1 or max(height, width) > LONGEST_SIDE:
+        raise UsageError(
+            f"{path}: a {kind} of {height} x {width} pixels, expected 1 to {LONGEST_SIDE} each way"
+        )
+    if depth not in (8, 16):
+        raise UsageError(f"{path}: {depth} bits per sample, a picture has 8 or 16")
