@@ -41,5 +41,18 @@ def _compile_numpy(plan: Schedule) -> Kernel:
     return compile_numpy(plan)
 
 
+def availability() -> dict[str, str]:
+    """What stands against each back end, or the versions that it runs with."""
+    return {"llvm": _llvm_state(), "numpy": f"NumPy {np.__version__}"}
+
+
+def _llvm_state() -> str:
+    if find_spec("llvmlite") is None:
+        return "not there: pip install 'iccbrdf[fast]'"
+    import llvmlite
+
+    return f"llvmlite {llvmlite.__version__}"
+
+
 COMPILERS: Mapping[str, Callable[[Schedule], Kernel]] = {}
 """The back ends, the quickest first.  A compiler raises UnsupportedError for what it cannot run."""

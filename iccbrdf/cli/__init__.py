@@ -22,6 +22,7 @@ COMMANDS = {
     "apply": "Map an image through profiles: XYZ TIFFs and PNG softproofs.",
     "dump": "Show what a profile holds.",
     "demo": "Softproof a relief print of a real landscape.",
+    "info": "Show the back ends, and what would run a chain of profiles.",
 }
 _INTERNAL_ERROR = IccBrdfError.exit_code
 _INTERRUPTED = 130

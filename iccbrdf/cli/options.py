@@ -29,6 +29,17 @@ json_option = click.option(
 )
 force_option = click.option("--force", is_flag=True, help="Overwrite existing files.")
 
+BACKENDS = ("auto", "interpreter", "llvm", "numpy")
+"""As iccbrdf.cmm has them, which would take longer to import than this file to read."""
+
+backend_option = click.option(
+    "--backend",
+    type=click.Choice(BACKENDS),
+    default="auto",
+    show_default=True,
+    help="What computes; auto: the quickest that can run the profiles (see iccbrdf info).",
+)
+
 _LIGHT_HELP = (
     "Direction to the light: ZENITH,AZIMUTH in degrees (azimuth counter-clockwise from the image's right) "
     "or a vector X,Y,Z (x right, y up the image, z out of the print).  Default of the profiles: 45,180."

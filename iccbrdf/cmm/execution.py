@@ -14,7 +14,7 @@ from iccbrdf.calc.backends import COMPILERS, Kernel
 from iccbrdf.calc.exact_passes import EXACT_PASSES
 from iccbrdf.calc.graph import Graph
 from iccbrdf.calc.passes import Report, optimise
-from iccbrdf.calc.schedule import Schedule, schedule, uniform_values
+from iccbrdf.calc.schedule import Schedule, computed, schedule, uniform_values
 from iccbrdf.cmm.steps import Process, Step
 from iccbrdf.errors import UnsupportedError
 
@@ -137,6 +137,13 @@ class Compiled:
         if len(plan.graph.nodes) == len(self.schedule.graph.nodes):
             return self.schedule, self._finite
         return plan, COMPILERS[self.backend](plan)
+
+    def counts(self) -> dict[str, int]:
+        """Nodes of the graph, and how many of them are computed once a run and for every pixel."""
+        plan = self.schedule
+        once = sum(node.op != "const" for node in plan.uniform)
+        every = sum(1 for node in computed(plan.body) if node.op not in ("input", "pick"))
+        return {"nodes": len(plan.graph.nodes), "nodes_once_a_run": once, "nodes_for_every_pixel": every}
 
     def bind(self, env: Mapping[str, float]) -> Run:
         arguments = uniform_values(self.schedule, env)

@@ -44,6 +44,9 @@ class Process:
     registers: int
     """An upper bound of the values that a pixel needs at a time."""
 
+    executed: int
+    """Operators on the longest path of its programs."""
+
     @classmethod
     def checked(cls, process: MultiProcess, origin: str) -> Process:
         """After the checks that make it safe to run: elements that are known here, sound programs.
@@ -52,13 +55,17 @@ class Process:
         """
         variables: set[str] = set()
         registers = process.inputs
+        executed = 0
         for i, element in enumerate(process.elements):
             place = f"{origin}: element {i}"
             _check_runnable(element, place)
             programs = verify_element(element, where=f"{place} ({element.signature})")
             variables.update(*(p.environment for p in programs))
             registers = max(registers, element.outputs, *(p.max_depth + p.temporaries for p in programs))
-        return cls(origin, process.elements, tuple(sorted(variables.difference(RESERVED))), registers)
+            executed += sum(p.executed for p in programs)
+        return cls(
+            origin, process.elements, tuple(sorted(variables.difference(RESERVED))), registers, executed
+        )
 
     def apply(self, channels: Sequence[Channel], env: Mapping[str, float], dtype: Any) -> list[Channel]:
         for element in self.elements:
