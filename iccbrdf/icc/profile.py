@@ -255,17 +255,11 @@ def compute_profile_id(data: bytes) -> bytes:
     return hashlib.md5(zeroed, usedforsecurity=False).digest()
 
 
-def read_profile(path: str | os.PathLike[str]) -> Profile:
-    """Read a profile from a file (ICC.2 version 5; also versions 2 and 4, of whose tag types most stay raw).
+def read_bytes(path: str | os.PathLike[str]) -> bytes:
+    """The bytes of a profile's file, whatever they are.
 
-    Raises
-    ------
-    InputError
-        The file is missing or cannot be read.
-    UsageError
-        `path` is no path.
-    ProfileError, UnsupportedError, LimitError
-        As `Profile.from_bytes`; LimitError also for a file above `MAX_BYTES`.
+    Raises InputError where it is missing or cannot be read, LimitError above `MAX_BYTES`, and UsageError
+    where `path` is no path.
     """
     try:
         with Path(path).open("rb") as file:
@@ -276,7 +270,20 @@ def read_profile(path: str | os.PathLike[str]) -> Profile:
         raise UsageError(f"not the path of a profile: {error}") from None
     if len(data) > MAX_BYTES:
         raise LimitError(f"{path}: larger than the limit of {MAX_BYTES} bytes")
-    return Profile.from_bytes(data, source=str(path))
+    return data
+
+
+def read_profile(path: str | os.PathLike[str]) -> Profile:
+    """Read a profile from a file (ICC.2 version 5; also versions 2 and 4, of whose tag types most stay raw).
+
+    Raises
+    ------
+    InputError, UsageError, LimitError
+        As `read_bytes`.
+    ProfileError, UnsupportedError, LimitError
+        As `Profile.from_bytes`.
+    """
+    return Profile.from_bytes(read_bytes(path), source=str(path))
 
 
 def write_profile(profile: Profile, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:

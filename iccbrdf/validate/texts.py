@@ -1,0 +1,50 @@
+"""Checks of texts: descriptions, copyright, and every other text in a tag of its own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from iccbrdf.icc import Mluc, PlainText, Utf8
+from iccbrdf.validate.findings import Finding, Place, finding
+from iccbrdf.validate.subject import Subject
+
+_LANGUAGE = re.compile(r"[a-z]{2}")
+_COUNTRY = re.compile(r"[A-Z]{2}|\0\0")
+_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
+
+
+def check_texts(subject: Subject) -> Iterator[Finding]:
+    """Texts in one language, and those in several."""
+    for tag in subject.distinct:
+        if isinstance(tag.value, Mluc):
+            yield from _localised(tag.value, tag.place)
+        elif isinstance(tag.value, (PlainText, Utf8)):
+            yield from _text(tag.value.text, tag.place)
+            if isinstance(tag.value, PlainText) and not tag.value.text.isascii():
+                yield finding("TXT-005", tag.place, "found bytes above 127, expected none")
+
+
+def _localised(value: Mluc, place: Place) -> Iterator[Finding]:
+    if not value.texts:
+        yield finding("TXT-001", place, "found no text in any language")
+    seen: set[tuple[str, str]] = set()
+    for index, item in enumerate(value.texts):
+        here = place.inner(f"text {index}", place.offset)
+        yield from _text(item.text, here)
+        key = item.language, item.country
+        if not _LANGUAGE.fullmatch(item.language) or not _COUNTRY.fullmatch(item.country):
+            message = f"found {item.language!r}, {item.country!r}, expected such as 'en', 'GB'"
+            yield finding("TXT-002", here, message)
+        if key in seen:
+            yield finding("TXT-004", here, f"found {item.language!r}, {item.country!r} a second time")
+        seen.add(key)
+
+
+def _text(text: str, place: Place) -> Iterator[Finding]:
+    if not text.strip("\0 \t\r\n"):
+        yield finding("TXT-001", place, f"found {text!r}, expected a text")
+    control = _CONTROL.search(text)
+    if control is not None:
+        message = f"found {control[0]!r} after {control.start()} characters, expected text alone"
+        yield finding("TXT-003", place, message)
