@@ -6,15 +6,16 @@ makes; only their attributes are used here.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
+from iccbrdf.calc.appearance import jab_to_xyz, xyz_to_jab
 from iccbrdf.calc.meanings import Value, where
+from iccbrdf.calc.tables import TetrahedralTable, clip, multilinear, tetrahedral
 from iccbrdf.errors import ProfileError, UnsupportedError
 
 Environment: TypeAlias = Mapping[str, float]
@@ -33,7 +34,9 @@ def apply(
     variables for calculators.  Computes in `dtype`; returns `element.outputs` arrays or scalars of it.
 
     matf: M x + o.  clut, xclt: multilinear, inputs clipped to 0..1, NaN as 0.  tint: linear, as clut.
-    cvst: a break point belongs to the segment on its left; NaN stays NaN.  calc: see interpreter.run.
+    cvst: a break point belongs to the segment on its left; NaN stays NaN.  tmap: gain y (x + offset) + black,
+    where y is the curve of the last input.  XtoJ, JtoX: see appearance.  calc: see interpreter.run.
+    bACS, eACS: nothing.
     Raises UnsupportedError for any other element.
     """
     function = _FUNCTIONS.get(element.signature)
@@ -58,31 +61,12 @@ def _matrix(element: Any, channels: Sequence[Value], env: Environment) -> list[V
     ]
 
 
-def _clip(x: Value) -> Value:
-    """Into 0..1, NaN to 0."""
-    one = x.dtype.type(1)
-    return where(x > 0, np.minimum(x, one), x.dtype.type(0))
-
-
 def _look_up_table(element: Any, channels: Sequence[Value], env: Environment) -> list[Value]:
-    """Sum over the corners of the cell that a pixel lies in; the last channel varies fastest."""
-    grid, nodes = element.table.shape[:-1], element.table.reshape(-1, element.outputs)
-    dtype = channels[0].dtype
-    cell: Value = np.asarray(0)
-    axes = []
-    stride = nodes.shape[0]
-    for x, count in zip(channels, grid, strict=True):
-        stride //= count
-        position = _clip(x) * dtype.type(count - 1)
-        left = np.minimum(np.floor(position), dtype.type(count - 2))
-        cell = cell + left.astype(np.intp) * stride
-        axes.append(((0, 1 - (position - left)), (stride, position - left)))
-    outputs: list[Value] = [np.asarray(dtype.type(0))[()]] * element.outputs
-    for corner in itertools.product(*axes):
-        weight = reduce(np.multiply, (part for _, part in corner))
-        values = nodes[cell + sum(step for step, _ in corner)].astype(dtype, copy=False)
-        outputs = [total + weight * values[..., j] for j, total in enumerate(outputs)]
-    return outputs
+    return multilinear(element.table, channels)
+
+
+def _tetrahedral(element: Any, channels: Sequence[Value], env: Environment) -> list[Value]:
+    return tetrahedral(element.table, channels)
 
 
 def _interpolate(nodes: Value, position: Value) -> Value:
@@ -95,8 +79,30 @@ def _interpolate(nodes: Value, position: Value) -> Value:
 
 def _tint(element: Any, channels: Sequence[Value], env: Environment) -> list[Value]:
     rows = element.table.astype(np.float64)
-    position = _clip(channels[0]).astype(np.float64) * (len(rows) - 1)
+    position = clip(channels[0]).astype(np.float64) * (len(rows) - 1)
     return [_interpolate(column, position).astype(channels[0].dtype) for column in rows.T]
+
+
+def _tone_map(element: Any, channels: Sequence[Value], env: Environment) -> list[Value]:
+    *colours, luminance = channels
+    level = apply_curve(element.luminance, luminance, env)
+    return [
+        gain * level * (x + offset) + black
+        for x, function in zip(colours, element.functions, strict=True)
+        for gain, offset, black in [map(x.dtype.type, function.parameters)]
+    ]
+
+
+def _xyz_to_jab(element: Any, channels: Sequence[Value], env: Environment) -> list[Value]:
+    return xyz_to_jab(element, list(channels))
+
+
+def _jab_to_xyz(element: Any, channels: Sequence[Value], env: Environment) -> list[Value]:
+    return jab_to_xyz(element, list(channels))
+
+
+def _nothing(element: Any, channels: Sequence[Value], env: Environment) -> list[Value]:
+    return list(channels)
 
 
 def _calculator(element: Any, channels: Sequence[Value], env: Environment) -> list[Value]:
@@ -131,31 +137,57 @@ def _curve_set(element: Any, channels: Sequence[Value], env: Environment) -> lis
 
 
 def _segmented(curve: Any, x: Value, env: Environment) -> Value:
-    starts = [-np.inf, *curve.breakpoints]
-    ends = [*curve.breakpoints, np.inf]
-    pieces = []
-    joint: Value | None = None
-    for start, end, segment in zip(starts, ends, curve.segments, strict=True):
-        pieces.append((end, _segment(segment, x, start, end, joint)))
-        joint = _segment(segment, np.asarray(end, np.float64), start, end, joint)
     result = x
-    for end, values in reversed(pieces):
-        result = where(x <= end, values, result)
+    for piece in reversed(pieces(curve)):
+        values = _segment(piece, x)
+        result = where(x <= piece.end, values, result)
     return result
 
 
-def _segment(segment: Any, x: Value, start: float, end: float, joint: Value | None) -> Value:
-    """One segment over (start, end]; `joint` is the value of the one before at `start`."""
-    if segment.signature == "parf":
-        if segment.type not in _FORMULAS:
-            raise UnsupportedError(f"formula segment of type {segment.type}, expected 0 to {max(_FORMULAS)}")
-        return _FORMULAS[segment.type](x, *map(float, segment.parameters))
-    if segment.signature != "samf":
-        raise UnsupportedError(f"curve segment {segment.signature!r} cannot be evaluated, only parf, samf")
-    if joint is None or np.isinf(end):
+class Piece(NamedTuple):
+    """One segment of a curve, over (start, end]; `joint` is the value of the one before at `start`."""
+
+    segment: Any
+    start: float
+    end: float
+    joint: Value | None
+
+
+def pieces(curve: Any) -> list[Piece]:
+    """The segments of a segmented curve with what they need to know of each other."""
+    found: list[Piece] = []
+    joint: Value | None = None
+    starts, ends = [-np.inf, *curve.breakpoints], [*curve.breakpoints, np.inf]
+    for start, end, segment in zip(starts, ends, curve.segments, strict=True):
+        found.append(Piece(segment, start, end, joint))
+        joint = _segment(found[-1], np.asarray(end, np.float64))
+    return found
+
+
+def _segment(piece: Piece, x: Value) -> Value:
+    if piece.segment.signature == "parf":
+        values: Value = formula(piece.segment, x)
+        return values
+    nodes = piece_nodes(piece)
+    return _interpolate(nodes, (x - piece.start) / (piece.end - piece.start) * (len(nodes) - 1))
+
+
+def formula(segment: Any, x: Any) -> Any:
+    """A formula segment of x: an array, or whatever takes NumPy's arithmetic."""
+    if segment.type not in _FORMULAS:
+        raise UnsupportedError(f"formula segment of type {segment.type}, expected 0 to {max(_FORMULAS)}")
+    return _FORMULAS[segment.type](x, *map(float, segment.parameters))
+
+
+def piece_nodes(piece: Piece) -> Value:
+    """The float64 values of a sampled segment at equal distances from its start to its end."""
+    if piece.segment.signature != "samf":
+        raise UnsupportedError(
+            f"curve segment {piece.segment.signature!r} cannot be evaluated, only parf, samf"
+        )
+    if piece.joint is None or np.isinf(piece.end):
         raise ProfileError("sampled segment as the first or last of its curve, expected a formula segment")
-    nodes = np.concatenate([[joint], segment.values]).astype(np.float64)
-    return _interpolate(nodes, (x - start) / (end - start) * len(segment.values))
+    return np.concatenate([[piece.joint], piece.segment.values]).astype(np.float64)
 
 
 def _sampled(curve: Any, x: Value, env: Environment) -> Value:
@@ -213,6 +245,12 @@ _FUNCTIONS: Mapping[str, Callable[[Any, Sequence[Value], Environment], list[Valu
     "cvst": _curve_set,
     "tint": _tint,
     "calc": _calculator,
+    "tmap": _tone_map,
+    "XtoJ": _xyz_to_jab,
+    "JtoX": _jab_to_xyz,
+    "bACS": _nothing,
+    "eACS": _nothing,
+    TetrahedralTable.signature: _tetrahedral,
 }
 
 SIGNATURES = tuple(_FUNCTIONS)
