@@ -1,0 +1,181 @@
+"""The NumPy back end: a schedule as steps of ufuncs on tiles of pixels.
+
+A kernel holds no text and no generated source: its code is a list of (function, which operands), made
+once from the graph.  A tile's pixels are brought into planes, every step writes a whole plane, and the
+outputs are written back pixel by pixel.  The tile is as large as keeps all planes within the cache.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from operator import itemgetter
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iccbrdf.calc.buffers import Allocation, Fork, Kind, Operand, Place, Steps, View, allocate
+from iccbrdf.calc.numpy_lowering import lower
+from iccbrdf.calc.schedule import Schedule
+
+CACHE = 1 << 20
+"""Bytes of the buffers together: what a core's second-level cache holds beside the pixels themselves."""
+LEAST_TILE, LARGEST_TILE = 1 << 12, 1 << 14
+"""Pixels: below, calling the ufuncs costs more than they do; above, nothing is gained."""
+MAX_VALUES = 1 << 24
+"""Numbers in the buffers together: programs may ask for so many buffers that fewer pixels must do."""
+
+Frame: TypeAlias = list[Any]
+"""All that steps read and write while a tile is computed, by position."""
+Bound: TypeAlias = "list[tuple[Callable[..., Any], Callable[[Frame], tuple[Any, ...]]]]"
+"""Functions, each with what takes its operands from a frame."""
+
+
+def compile_numpy(plan: Schedule) -> NumpyKernel:
+    """The kernel that runs a schedule."""
+    return NumpyKernel(plan, lower(plan))
+
+
+# Running -----------------------------------------------------------------------------------------------
+
+
+class NumpyKernel:
+    """A compiled schedule.  It may be run by several threads at once: each run has buffers of its own."""
+
+    def __init__(self, plan: Schedule, steps: Steps) -> None:
+        self._dtype = np.dtype(plan.graph.dtype)
+        self._channels, self._outputs = plan.channels, len(plan.graph.outputs)
+        self._layout = _Layout(plan, allocate(steps))
+        self._code = _bound(steps, self._layout)
+        bytes_per_pixel = self.registers * self._dtype.itemsize
+        fitting = 1 << (CACHE // max(bytes_per_pixel, 1)).bit_length() - 1
+        largest = MAX_VALUES // max(self.registers, 1)
+        self.tile = max(1, min(max(fitting, LEAST_TILE), LARGEST_TILE, largest))
+        self._idle: list[_Planes] = []
+
+    @property
+    def registers(self) -> int:
+        """The number of buffers of numbers."""
+        return self._layout.allocation.numbers
+
+    def run(self, pixels: NDArray[Any], out: NDArray[Any], arguments: Sequence[np.generic]) -> None:
+        """
+        Compute pixels.
+
+        Parameters
+        ----------
+        pixels
+            (n, channels), of any strides and any type that NumPy casts to the graph's.
+        out
+            (n, outputs) of the graph's type, of any strides; not the same memory as `pixels`.
+        arguments
+            The values of the schedule's arguments (calc/schedule.py, uniform_values).
+        """
+        try:
+            # Lists give and take single items atomically.
+            planes = self._idle.pop()
+        except IndexError:
+            planes = _Planes(self._layout, self._dtype, self.tile)
+        uniform = self._layout.uniform(arguments, self._dtype)
+        size = -1
+        with np.errstate(all="ignore"):
+            for start in range(0, len(pixels), self.tile):
+                part = slice(start, start + self.tile)
+                ins, outs = pixels[part].T, out[part].T
+                if ins.shape[1] != size:
+                    size = ins.shape[1]
+                    frame = [*ins, *outs, *planes.views(size), *uniform]
+                else:
+                    frame[: len(ins) + len(outs)] = [*ins, *outs]
+                _execute(self._code, frame)
+        self._idle.append(planes)
+
+
+def _execute(code: Bound, frame: Frame) -> None:
+    for function, operands in code:
+        function(*operands(frame))
+
+
+class _Planes:
+    """The buffers of one run."""
+
+    def __init__(self, layout: _Layout, dtype: np.dtype[Any], tile: int) -> None:
+        self._numbers = np.empty((layout.allocation.numbers, tile), dtype)
+        self._masks = np.empty((layout.allocation.masks, tile), np.bool_)
+
+    def views(self, size: int) -> Frame:
+        """The buffers for a tile of `size` pixels, as the layout has them."""
+        numbers, masks = self._numbers[:, :size], self._masks[:, :size]
+        return [*numbers, *numbers.view(f"i{numbers.itemsize}"), *masks, *masks.view(np.int8)]
+
+
+class _Layout:
+    """Where in a frame things stand: channels in and out, buffers as their views, constants, arguments."""
+
+    def __init__(self, plan: Schedule, allocation: Allocation) -> None:
+        self.allocation = allocation
+        inputs, outputs = plan.channels, len(plan.graph.outputs)
+        numbers, masks = allocation.numbers, allocation.masks
+        buffers = inputs + outputs
+        self._start = {
+            (Kind.INPUT, View.NUMBER): 0,
+            (Kind.OUTPUT, View.NUMBER): inputs,
+            (Kind.NUMBER, View.NUMBER): buffers,
+            (Kind.NUMBER, View.BITS): buffers + numbers,
+            (Kind.MASK, View.MASK): buffers + 2 * numbers,
+            (Kind.MASK, View.BYTE): buffers + 2 * numbers + masks,
+        }
+        arguments, count = buffers + 2 * numbers + 2 * masks, len(plan.arguments)
+        views = (View.NUMBER, View.BITS, View.MASK, View.WIDE)
+        self._start |= {(Kind.ARGUMENT, view): arguments + i * count for i, view in enumerate(views)}
+        self._constants: list[np.generic] = []
+        self._end = arguments + len(views) * count
+
+    def at(self, operand: Operand) -> int:
+        """The position of an operand; a constant is given one."""
+        if not isinstance(operand, Place):
+            self._constants.append(operand)
+            return self._end + len(self._constants) - 1
+        register = operand.register
+        index = self.allocation.buffer.get(register, register.index)
+        return self._start[register.kind, operand.view] + index
+
+    def uniform(self, arguments: Sequence[np.generic], dtype: np.dtype[Any]) -> Frame:
+        """The part of a frame that holds for all tiles of a run."""
+        numbers = np.array(arguments, dtype)
+        masks = numbers >= 0.5
+        integer = np.dtype(f"i{dtype.itemsize}")
+        return [*numbers, *numbers.view(integer), *masks, *-masks.astype(integer), *self._constants]
+
+
+def _bound(steps: Steps, layout: _Layout) -> Bound:
+    code: Bound = []
+    for step in steps:
+        if isinstance(step, Fork):
+            code.append((_Choice(step, layout), _whole_frame))
+        else:
+            code.append((step.function, itemgetter(*map(layout.at, (*step.reads, *step.writes)))))
+    return code
+
+
+def _whole_frame(frame: Frame) -> tuple[Frame]:
+    return (frame,)
+
+
+class _Choice:
+    """A fork that is ready to run."""
+
+    def __init__(self, fork: Fork, layout: _Layout) -> None:
+        self._condition = layout.at(fork.condition)
+        self._yes, self._no = _bound(fork.yes, layout), _bound(fork.no, layout)
+        self._only_yes, self._only_no = _bound(fork.only_yes, layout), _bound(fork.only_no, layout)
+        self._both = _bound(fork.both, layout)
+
+    def __call__(self, frame: Frame) -> None:
+        mask = frame[self._condition]
+        held = np.count_nonzero(mask)
+        if held:
+            _execute(self._yes, frame)
+        if held < mask.size:
+            _execute(self._no, frame)
+        _execute(self._only_no if not held else self._only_yes if held == mask.size else self._both, frame)
