@@ -180,7 +180,7 @@ def test_sampled_calculator_curve():
     np.testing.assert_array_equal(apply(curves(curve), [[0, 1]]), [[7, 7]])
 
 
-@pytest.mark.parametrize("name", ["smet", "XtoJ", "eobs"])
+@pytest.mark.parametrize("name", ["smet", "rclt", "eobs"])
 def test_unknown_elements_are_named(name):
     with pytest.raises(UnsupportedError, match=f"'{name}' cannot be evaluated, only matf, clut"):
         apply(element(name, 1, 1), [1.0])
@@ -218,11 +218,27 @@ def test_operators_of_elements(operator, applied, expected):
     assert run(parse(f"in(0) {operator}(0) out(0)"), [0.25], 1, elements=[applied]) == [expected]
 
 
-@pytest.mark.parametrize("operator", ["tJab", "fJab"])
-def test_operators_of_elements_without_evaluation(operator):
-    signature = {"tJab": "XtoJ", "fJab": "JtoX"}[operator]
-    with pytest.raises(UnsupportedError, match=signature):
-        run(parse(f"1 2 3 {operator}(0)"), [], 1, elements=[element(signature, 3, 3)])
+@pytest.mark.parametrize(("operator", "signature"), [("tJab", "XtoJ"), ("fJab", "JtoX")])
+def test_operators_of_the_appearance_model(operator, signature):
+    white = {"white": (96.42, 100.0, 82.49), "luminance": 500.0, "background": 20.0}
+    factors = {"surround": 0.69, "induction": 1.0, "adaptation": 1.0}
+    applied = element(signature, 3, 3, **white, **factors)
+    outs = run(parse(f"20 19 18 {operator}(0) out(0,3)"), [], 3, elements=[applied])
+    assert outs == apply(applied, [20.0, 19.0, 18.0])
+
+
+def test_tone_map():
+    """Each channel: gain times luminance times (x + offset), then black is added."""
+    functions = [SimpleNamespace(parameters=p) for p in ((2.0, 0.5, 0.25), (1.0, 0.0, -1.0))]
+    tone = element("tmap", 3, 2, luminance=sampled([0, 10]), functions=functions)
+    outs = apply(tone, [[1.0, 0.0], 3.0, [0.5, 0.25]])
+    np.testing.assert_array_equal(outs[0], [2 * 5 * 1.5 + 0.25, 2 * 2.5 * 0.5 + 0.25])
+    np.testing.assert_array_equal(outs[1], [5 * 3 - 1, 2.5 * 3 - 1])
+
+
+@pytest.mark.parametrize("signature", ["bACS", "eACS"])
+def test_marks_of_alternate_spaces_do_nothing(signature):
+    assert apply(element(signature, 2, 2), [1.0, 2.0]) == [1, 2]
 
 
 def test_nested_calculators_have_memory_and_stack_of_their_own():

@@ -85,9 +85,10 @@ def _calculators(element: Any, where: str) -> list[Any]:
     """The calculators that an element is or holds."""
     if element.signature == "calc":
         return [element]
-    if element.signature != "cvst":
+    if element.signature not in ("cvst", "tmap"):
         return []
-    curves = [curve for curve in element.curves if curve.signature == "clcf"]
+    held = element.curves if element.signature == "cvst" else [element.luminance]
+    curves = [curve for curve in held if curve.signature == "clcf"]
     for curve in curves:
         if curve.size > MAX_SAMPLES:
             raise LimitError(f"{where}: {curve.size} samples of a curve, expected at most {MAX_SAMPLES}")
