@@ -9,8 +9,7 @@ What stands here is the public face; the modules behind it are imported when a n
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from iccbrdf.errors import (
     IccBrdfError,
@@ -25,6 +24,7 @@ from iccbrdf.errors import (
     UsageError,
     VariableError,
 )
+from iccbrdf.lazy import lazy_names
 
 if TYPE_CHECKING:
     from iccbrdf.cmm import Transform, link
@@ -61,12 +61,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module(_LAZY[name]), name)
-    globals()[name] = value
-    return value
+__getattr__ = lazy_names(__name__, _LAZY)
 
 
 def __dir__() -> list[str]:

@@ -14,8 +14,8 @@ from typing import Any
 from iccbrdf.brdf.primaries import Primaries, check_nodes
 from iccbrdf.brdf.slopes import Slopes, published_jumps
 from iccbrdf.brdf.smooth_interpolation import SmoothMap
-from iccbrdf.build.brdf_image import IMAGE_TAG, image_encoding
 from iccbrdf.build.models import MODELS
+from iccbrdf.build.private_tags import IMAGE_TAG, SLOPES_TAG, image_encoding
 from iccbrdf.build.profiles import decoding, ranges, text_tags
 from iccbrdf.calc import Compiled, compile_chain
 from iccbrdf.calc import listing as program_listing
@@ -25,9 +25,6 @@ from iccbrdf.resources import folder
 
 INTERPOLATIONS = ("smooth", "published")
 SLOPE_METHODS = ("affine", "published")
-
-SLOPES_TAG = "slop"
-"""Private tag (fl32) of a colour MID: the measured slopes in degrees.  Beyond the last one, it is held."""
 
 
 @dataclass(frozen=True)
@@ -109,12 +106,6 @@ def build_colour_mid(
         listing="\n".join(_lines(compiled, title, slopes)) + "\n",
         compiled=compiled,
     )
-
-
-def last_slope(profile: Profile) -> float | None:
-    """The steepest slope in degrees that a colour MID has measurements for; None where it adjusts to none."""
-    slopes = profile.get(SLOPES_TAG)
-    return float(slopes.values[-1]) if isinstance(slopes, NumberArray) and len(slopes.values) else None
 
 
 def _check_slopes(primaries: Primaries, slopes: Slopes) -> None:

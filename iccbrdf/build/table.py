@@ -22,9 +22,9 @@ from iccbrdf.brdf.interpolation import InterpolationMethod, interpolate
 from iccbrdf.brdf.models import NORMAL, find_model
 from iccbrdf.brdf.primaries import Primaries
 from iccbrdf.brdf.smooth_interpolation import DIFFUSE, GLOSS, GLOSS_FLOOR, KNEE
-from iccbrdf.build.brdf_image import IMAGE_TAG, image_encoding
 from iccbrdf.build.models import MODELS
 from iccbrdf.build.power import Power, cube, near_exponential, quantised, root
+from iccbrdf.build.private_tags import IMAGE_TAG, image_encoding
 from iccbrdf.build.profiles import COPYRIGHT, decoding, ranges, text_tags
 from iccbrdf.build.table_error import TableError, measure
 from iccbrdf.build.viewing import viewing

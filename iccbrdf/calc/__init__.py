@@ -3,11 +3,21 @@
 Knows no files and no BRDF.
 """
 
-from iccbrdf.calc.compiler import Compiled, compile_chain, compile_template
+from typing import TYPE_CHECKING
+
 from iccbrdf.calc.interpreter import run
 from iccbrdf.calc.operators import OPERATORS
 from iccbrdf.calc.program import Op, Program, decode_ops, encode_ops, listing, parse
 from iccbrdf.calc.verify import Checked, verify, verify_element
+from iccbrdf.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from iccbrdf.calc.compiler import Compiled, compile_chain, compile_template
+
+# Profiles are read and run far more often than templates are compiled, for which there is a grammar to load.
+__getattr__ = lazy_names(
+    __name__, dict.fromkeys(("Compiled", "compile_chain", "compile_template"), "iccbrdf.calc.compiler")
+)
 
 __all__ = [
     "OPERATORS",
