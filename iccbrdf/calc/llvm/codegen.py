@@ -1,0 +1,271 @@
+"""From a schedule to a function in LLVM assembly.
+
+The function takes whole blocks of as many pixels as a vector has lanes: it loads their channels, computes
+every node of the body as one vector, and stores the outputs.  A branch tests its condition and jumps over
+a side that no pixel of the block needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iccbrdf.calc.graph import Node, is_truth
+from iccbrdf.calc.llvm import functions, lookup, wide
+from iccbrdf.calc.llvm.assembler import Assembler, Type, Value
+from iccbrdf.calc.llvm.rows import load_channels, store_channels
+from iccbrdf.calc.llvm.target import Target
+from iccbrdf.calc.schedule import Block, Branch, Schedule, computed
+from iccbrdf.errors import UnsupportedError
+
+ENTRY = "kernel"
+"""The function: (pixels, out, number of blocks, arguments, tables)."""
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A program as text, and what it is called with."""
+
+    text: str
+    lanes: int
+    """Pixels of a block."""
+    tables: tuple[NDArray[Any], ...]
+
+
+def assemble(schedule: Schedule, target: Target) -> Assembly:
+    """
+    Write a schedule as LLVM assembly.  Equal schedules give equal text; tables are not part of it.
+
+    Raises
+    ------
+    UnsupportedError
+        For a node that this back end cannot run.
+    """
+    body = _Body(schedule, target)
+    return Assembly(body.write(), body.type.lanes, tuple(body.tables.arrays))
+
+
+class _Body:
+    """A function in the making."""
+
+    def __init__(self, schedule: Schedule, target: Target) -> None:
+        self.schedule = schedule
+        single = schedule.graph.dtype is np.float32
+        self.type = Type("float", target.lanes) if single else Type("double", max(4, target.lanes // 2))
+        self.code = Assembler(target, self.type.element, block="loop")
+        self.tables = lookup.Tables(self.code)
+        self.values: dict[Node, Value] = {}
+        self.several: dict[Node, list[Value]] = {}
+
+    def write(self) -> str:
+        code, schedule, real = self.code, self.schedule, self.type.element
+        read = code.scalar(f"mul i64 %i, {schedule.channels * self.type.lanes}")
+        written = code.scalar(f"mul i64 %i, {len(schedule.graph.outputs) * self.type.lanes}")
+        source, sink = code.address("%pixels", real, read), code.address("%out", real, written)
+        self._inputs(source)
+        self._arguments()
+        self._block(schedule.body)
+        store_channels(code, sink, [self.number(output) for output in schedule.graph.outputs])
+        lines = [
+            *code.needed.values(),
+            f"define void @{ENTRY}(ptr noalias readonly %pixels, ptr noalias writeonly %out, i64 %blocks, "
+            "ptr noalias readonly %arguments, ptr noalias readonly %tables) {",
+            "entry:",
+            *self.tables.prologue(),
+            "  br label %loop",
+            "loop:",
+            f"  %i = phi i64 [ 0, %entry ], [ %next, %{code.block} ]",
+            *code.lines,
+            "  %next = add nuw nsw i64 %i, 1",
+            "  %more = icmp ult i64 %next, %blocks",
+            "  br i1 %more, label %loop, label %end",
+            "end:",
+            "  ret void",
+            "}",
+        ]
+        return "\n".join(lines)
+
+    def _inputs(self, source: str) -> None:
+        schedule = self.schedule
+        nodes = {n.detail: n for n in (*computed(schedule.body), *schedule.graph.outputs) if n.op == "input"}
+        channels = load_channels(self.code, source, self.type, schedule.channels, nodes)
+        self.values.update((node, channels[channel]) for channel, node in nodes.items())
+
+    def _arguments(self) -> None:
+        code = self.code
+        for position, node in enumerate(self.schedule.arguments):
+            where = code.address("%arguments", self.type.element, position)
+            number = code.scalar(f"load {self.type.element}, ptr {where}, align {self.type.size}")
+            value = code.broadcast(number, self.type)
+            self.values[node] = value.differs(0.0) if is_truth(node) else value
+
+    def _block(self, block: Block) -> None:
+        for item in block:
+            if isinstance(item, Branch):
+                self._branch(item)
+            elif item.op != "input":
+                self._node(item)
+
+    def _branch(self, branch: Branch) -> None:
+        condition = self.truth(branch.condition)
+        self._side(condition, branch.yes, [select.arguments[1] for select in branch.selects])
+        self._side(~condition, branch.no, [select.arguments[2] for select in branch.selects])
+        for select in branch.selects:
+            self._node(select)
+
+    def _side(self, mask: Value, block: Block, wanted: Sequence[Node]) -> None:
+        """Compute a block where any pixel needs it; what the selects read of it is known afterwards."""
+        inside = set(computed(block))
+        results = [node for node in dict.fromkeys(wanted) if node in inside and node.op != "input"]
+        if not results:
+            return
+
+        def compute() -> list[Value]:
+            self._block(block)
+            return [self.values[node] for node in results]
+
+        self.values.update(zip(results, self.code.where_any(mask, compute), strict=True))
+
+    def _node(self, node: Node) -> None:
+        if node.op in _SEVERAL:
+            self.several[node] = _SEVERAL[node.op](self.tables, node.detail, self._numbers(node))
+        elif node.op == "pick":
+            self.values[node] = self.several[node.arguments[0]][node.detail]
+        elif node.op == "select":
+            condition, yes, no = node.arguments
+            self.values[node] = self.code.select(self.truth(condition), self.number(yes), self.number(no))
+        elif node.op == "curve":
+            self.values[node] = lookup.curve(self.tables, node.detail, self.number(node.arguments[0]))
+        elif node.op == "pow" and self.type.element == "float" and node.arguments[1].op == "const":
+            self.values[node] = wide.power(self.number(node.arguments[0]), node.arguments[1].detail[0])
+        elif node.op in _LOGIC:
+            self.values[node] = _LOGIC[node.op](*map(self.truth, node.arguments))
+        else:
+            special = _SINGLE if self.type.element == "float" else _DOUBLE
+            function = _OPERATORS.get(node.op) or special.get(node.op)
+            if function is None:
+                raise UnsupportedError(f"{node.op} cannot be run by LLVM ({node})")
+            self.values[node] = function(*self._numbers(node))
+
+    def _numbers(self, node: Node) -> list[Value]:
+        return [self.number(argument) for argument in node.arguments]
+
+    def number(self, node: Node) -> Value:
+        """A node's value as a number."""
+        if node.op == "const":
+            return self.code.constant(node.detail[0], self.type)
+        value = self.values[node]
+        return self.code.select(value, 1.0, 0.0, self.type) if is_truth(node) else value
+
+    def truth(self, node: Node) -> Value:
+        """A node's value as a condition."""
+        return self.values[node] if is_truth(node) else self.number(node) >= 0.5
+
+
+# What operators are ------------------------------------------------------------------------------------
+
+
+def _intrinsic(name: str) -> Callable[..., Value]:
+    return lambda *values: values[0].code.intrinsic(name, *values)
+
+
+def _library(name: str) -> Callable[..., Value]:
+    return lambda *values: values[0].code.each_lane(name, *values)
+
+
+def _sign(a: Value) -> Value:
+    code = a.code
+    return code.select(a > 0.0, 1.0, code.select(a < 0.0, -1.0, 0.0, a.type))
+
+
+def _to_int32(a: Value) -> Value:
+    """C's cast to a 32-bit int as x86 does it; see meanings.to_int32."""
+    code = a.code
+    return code.select(abs(a) < 2.0**31, code.intrinsic("trunc", a) + 0.0, -(2.0**31))
+
+
+def _round(a: Value) -> Value:
+    code = a.code
+    x = code.widen(a)
+    return code.narrow(_to_int32(code.select(x < 0.0, x - 0.5, x + 0.5)), a.type)
+
+
+def _choice(test: Callable[[Value, Value], Value]) -> Callable[[Value, Value], Value]:
+    return lambda a, b: a.code.select(test(a, b), a, b)
+
+
+def _modulo(a: Value, b: Value) -> Value:
+    return a.code.select(b.equals(0.0), a, a.code.each_lane("fmod", a, b))
+
+
+_OPERATORS: Mapping[str, Callable[..., Value]] = {
+    "neg": lambda a: -a,
+    "abs": abs,
+    "sqrt": _intrinsic("sqrt"),
+    "flor": _intrinsic("floor"),
+    "ceil": _intrinsic("ceil"),
+    "trnc": _to_int32,
+    "rond": _round,
+    "sign": _sign,
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "vmin": _choice(lambda a, b: a < b),
+    "vmax": _choice(lambda a, b: a > b),
+    "lt": lambda a, b: a < b,
+    "le": lambda a, b: a <= b,
+    "eq": lambda a, b: a.equals(b),
+    "neq": lambda a, b: a.differs(b),
+    "ge": lambda a, b: a >= b,
+    "gt": lambda a, b: a > b,
+    "rnum": lambda a: abs(a) < np.inf,
+}
+
+_SINGLE: Mapping[str, Callable[..., Value]] = {
+    "exp": functions.exp,
+    "log": wide.log10,
+    "ln": wide.ln,
+    "pow": wide.power,
+    "cbrt": functions.cbrt,
+    "sin": functions.sin,
+    "cos": functions.cos,
+    "tan": functions.tan,
+    "asin": functions.asin,
+    "acos": functions.acos,
+    "atan": functions.atan,
+    "atn2": functions.angle,
+    "mod": functions.modulo,
+}
+
+_DOUBLE: Mapping[str, Callable[..., Value]] = {
+    "exp": _library("exp"),
+    "log": _library("log10"),
+    "ln": _library("log"),
+    "pow": _library("pow"),
+    "cbrt": _library("cbrt"),
+    "sin": _library("sin"),
+    "cos": _library("cos"),
+    "tan": _library("tan"),
+    "asin": _library("asin"),
+    "acos": _library("acos"),
+    "atan": _library("atan"),
+    "atn2": lambda x, y: x.code.each_lane("atan2", y, x),
+    "mod": _modulo,
+}
+
+_LOGIC: Mapping[str, Callable[..., Value]] = {
+    "not": lambda a: ~a,
+    "vand": lambda a, b: a & b,
+    "vor": lambda a, b: a | b,
+    "vxor": lambda a, b: a ^ b,
+}
+
+_SEVERAL: Mapping[str, Callable[[lookup.Tables, Any, Sequence[Value]], list[Value]]] = {
+    "clut": lookup.look_up,
+    "tint": lookup.tint,
+}
