@@ -54,5 +54,5 @@ def _llvm_state() -> str:
     return f"llvmlite {llvmlite.__version__}"
 
 
-COMPILERS: Mapping[str, Callable[[Schedule], Kernel]] = {}
+COMPILERS: Mapping[str, Callable[[Schedule], Kernel]] = {"llvm": _compile_llvm, "numpy": _compile_numpy}
 """The back ends, the quickest first.  A compiler raises UnsupportedError for what it cannot run."""
