@@ -95,8 +95,8 @@ def _use(element: Located, flow: Flow) -> Iterator[Finding]:
     if flow.early_reads:
         first = min(flow.early_reads)
         message = (
-            f"op {first} ({written(calculator.program[first])}), the first of {len(flow.early_reads)}: temporaries "
-            f"{_listed(flow.too_early)} are read where a path has not written them, and are 0 here"
+            f"op {first} ({written(calculator.program[first])}), the first of {len(flow.early_reads)}: "
+            f"temporaries {_listed(flow.too_early)} are read where a path has not written them; 0 here"
         )
         yield finding("PRG-008", element.operation(first), message)
     if flow.end.depth:
