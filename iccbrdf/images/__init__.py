@@ -2,7 +2,7 @@
 
 from iccbrdf.images.blocks import Block, Place
 from iccbrdf.images.display import PngSink, create_png, srgb_profile, xyz_to_srgb
-from iccbrdf.images.in_order import in_order
+from iccbrdf.images.in_order import in_order, processors
 from iccbrdf.images.normals import height_to_normals, read_height_map, read_normal_map
 from iccbrdf.images.pictures import read_picture
 from iccbrdf.images.record import Samples
@@ -24,6 +24,7 @@ __all__ = [
     "height_to_normals",
     "in_order",
     "open_tiff",
+    "processors",
     "read_height_map",
     "read_normal_map",
     "read_picture",
