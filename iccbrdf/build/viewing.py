@@ -11,15 +11,7 @@ import numpy.typing as npt
 from iccbrdf.errors import InputError, nearest
 from iccbrdf.icc import Matrix, MultiProcess, ViewingConditions
 from iccbrdf.icc.header import D50
-
-OBSERVERS = {"CIE 1931 2 Degree Standard Observer": 1, "CIE 1964 10 Degree Standard Observer": 2}
-"""Observer -> id in spectralViewingConditionsType (ICC.2, 10.2.21); names of colour-science."""
-ILLUMINANTS = {
-    "D50": 1, "D65": 2, "D55": 5, "A": 6, "E": 7, "B": 11, "C": 12,
-    "FL1": 13, "FL2": 4, "FL3": 14, "FL4": 15, "FL5": 16, "FL6": 17,
-    "FL7": 18, "FL8": 8, "FL9": 19, "FL10": 20, "FL11": 21, "FL12": 22,
-}  # fmt: skip
-"""Illuminant -> id in spectralViewingConditionsType; names of colour-science."""
+from iccbrdf.icc.tags import ILLUMINANTS, OBSERVERS
 
 # 5 nm from 380 to 780 nm, the CIE's own step for colorimetry of reflecting samples.
 _START, _END, _STEP = 380, 780, 5

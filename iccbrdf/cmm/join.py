@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from iccbrdf.cmm.conditions import conditions, conversions
+from iccbrdf.cmm.spectral import to_spectra, to_XYZ
 from iccbrdf.cmm.stages import Stage
 from iccbrdf.cmm.steps import LabToXYZ, Process, Route, Scale, Step, XYZToLab
 from iccbrdf.errors import LinkError, ProfileError, nearest
@@ -15,6 +16,11 @@ _DEFAULT_TYPES = ("ui08", "ui16", "fl16", "fl32", "fl64")
 def join(before: Stage, after: Stage, *, absolute: bool) -> list[Step]:
     """The steps from the end of `before` to the start of `after`; LinkError where they do not fit."""
     here, there = before.destination, after.source
+    if here.kind == "spectral" and there.kind == "spectral":
+        return to_spectra(before, after)
+    if here.kind == "spectral" and there.kind == "pcs":
+        steps = [*to_XYZ(before), *_connection("XYZ ", before, after)]
+        return [*steps, *media_white(after, absolute, outward=False)]
     if here.kind != there.kind:
         raise LinkError(
             f"{before.profile.source} ends on {here.text}, {after.profile.source} starts from {there.text}"
@@ -24,7 +30,7 @@ def join(before: Stage, after: Stage, *, absolute: bool) -> list[Step]:
     if here.kind == "pcs":
         return [
             *media_white(before, absolute, outward=True),
-            *_connection(before, after),
+            *_connection(here.signature, before, after),
             *media_white(after, absolute, outward=False),
         ]
     if here.signature != there.signature:
@@ -34,9 +40,9 @@ def join(before: Stage, after: Stage, *, absolute: bool) -> list[Step]:
     return []
 
 
-def _connection(before: Stage, after: Stage) -> list[Step]:
-    """From one colorimetric connection space to the other; a change of conditions is done on XYZ."""
-    here, there = before.destination.signature, after.source.signature
+def _connection(here: str, before: Stage, after: Stage) -> list[Step]:
+    """From the connection space `here` to that of `after`; a change of conditions is done on XYZ."""
+    there = after.source.signature
     steps: list[Step] = [Process.checked(p, place) for place, p in conversions(before.profile, after.profile)]
     if here == there and not steps:
         return []

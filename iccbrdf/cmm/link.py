@@ -18,6 +18,7 @@ from iccbrdf.cmm.arrange import arranged, without_decoding
 from iccbrdf.cmm.environment import checked_environment
 from iccbrdf.cmm.execution import BACKENDS
 from iccbrdf.cmm.join import join, media_white
+from iccbrdf.cmm.resolve import INTERPOLATIONS
 from iccbrdf.cmm.stages import INTENTS, stages
 from iccbrdf.cmm.steps import Process, Step
 from iccbrdf.cmm.transform import Transform
@@ -37,6 +38,8 @@ def link(
     dtype: npt.DTypeLike = np.float32,
     channels: Sequence[str] | None = None,
     samples: str = "device",
+    interpolation: str = "multilinear",
+    spectral: bool = True,
 ) -> Transform:
     """Link v5 profiles, paths or objects, into one transform.
 
@@ -63,6 +66,12 @@ def link(
         `device`: input is 0..1, as the first profile's device space.  `real`: input is what the device
         values stand for (signed normals, physical parameters); the profile's leading matrix is left out.
         A first profile that starts from multiplex channels or XYZ takes real values in either case.
+    interpolation
+        Of look-up tables with three inputs: `multilinear`, as ICC's own CMM does in processing elements, or
+        `tetrahedral`, which keeps greys between greys.  Others are always multilinear.
+    spectral
+        Whether profiles that have both take spectra rather than colours to their neighbours, as ICC's own CMM
+        does; the results of a last one are spectra then.
 
     Raises
     ------
@@ -92,13 +101,14 @@ def link(
         (backend, BACKENDS, "backend"),
         (intent, INTENTS, "intent"),
         (samples, ("device", "real"), "samples"),
+        (interpolation, INTERPOLATIONS, "interpolation"),
     ):
         if value not in valid:
             raise UsageError(f"{what} {value!r} is unknown: {nearest(str(value), valid)}")
     number_type = _number_type(dtype)
 
     absolute = intent == "absolute"
-    first, *others = stages(chain, intent)
+    first, *others = stages(chain, intent, spectral=spectral)
     if samples == "real":
         first = without_decoding(first)
     steps: list[Step] = []
@@ -106,9 +116,9 @@ def link(
         steps, first = arranged(first, tuple(channels))
     if first.source.kind == "pcs":
         steps += media_white(first, absolute, outward=False)
-    steps.append(first.step())
+    steps.append(first.step(interpolation))
     for before, after in pairwise([first, *others]):
-        steps += [*join(before, after, absolute=absolute), after.step()]
+        steps += [*join(before, after, absolute=absolute), after.step(interpolation)]
     last = others[-1] if others else first
     if last.destination.kind == "pcs":
         steps += media_white(last, absolute, outward=True)

@@ -20,9 +20,17 @@ _NAMES = {
 }
 
 
+_KINDS = {
+    "device": "device space",
+    "mcs": "multiplex space",
+    "pcs": "connection space",
+    "spectral": "spectral connection space",
+}
+
+
 @dataclass(frozen=True)
 class Space:
-    """`kind` is device, mcs or pcs; `signature` the header's four characters (or nc000a, mc000a)."""
+    """`kind` is device, mcs, pcs or spectral; `signature` the header's four characters (or as nc000a)."""
 
     kind: str
     signature: str
@@ -31,20 +39,32 @@ class Space:
     @property
     def text(self) -> str:
         """For messages."""
-        kind = {"device": "device space", "mcs": "multiplex space", "pcs": "connection space"}[self.kind]
-        return f"{kind} {self.signature.strip()} of {len(self.names)} channels"
+        return f"{_KINDS[self.kind]} {self.signature.strip()} of {len(self.names)} channels"
 
 
 def pcs_space(profile: Profile) -> Space:
     """The colorimetric connection space."""
     signature = profile.header.pcs
     if signature not in ("XYZ ", "Lab "):
-        if profile.header.spectral_pcs:
-            raise UnsupportedError(f"{profile.source}: a spectral connection space, which cannot run yet")
         raise ProfileError(
             f"{profile.source}: header: connection space {signature!r}, expected 'XYZ ' or 'Lab '"
         )
     return Space("pcs", signature, _NAMES[signature])
+
+
+def spectral_space(profile: Profile) -> Space:
+    """The spectral connection space; its channels are named by their wavelengths where they have one each."""
+    header = profile.header
+    count = channel_count(header.spectral_pcs)
+    if not count:
+        raise ProfileError(
+            f"{profile.source}: header: spectral connection space {header.spectral_pcs!r}, "
+            "expected rs, ts, es, bs or sm and four hex digits, at least one channel"
+        )
+    names = tuple(map(str, range(1, count + 1)))
+    if count == header.spectral_steps and np.isfinite(header.spectral_range).all():
+        names = tuple(f"{wavelength:g} nm" for wavelength in np.linspace(*header.spectral_range, count))
+    return Space("spectral", header.spectral_pcs, names)
 
 
 def mcs_space(profile: Profile) -> Space:

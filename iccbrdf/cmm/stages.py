@@ -6,7 +6,8 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from iccbrdf.cmm.spaces import Space, device_space, mcs_space, pcs_space
+from iccbrdf.cmm.resolve import Resolver
+from iccbrdf.cmm.spaces import Space, device_space, mcs_space, pcs_space, spectral_space
 from iccbrdf.cmm.steps import Process
 from iccbrdf.errors import ProfileError, ProfileWarning, UnsupportedError, nearest
 from iccbrdf.icc import MultiProcess, Profile
@@ -20,7 +21,7 @@ _PREFERENCE = {0: (0, 1, 3, 2), 1: (1, 3, 0, 2), 2: (2, 0, 1, 3), 3: (3, 1, 0, 2
 _BY_THE_BOOK = {0: (0,), 1: (1, 3, 0), 2: (2, 0), 3: (3, 1, 0)}
 
 _CANNOT_RUN = ("M2S", "D2B", "B2D", "rTRC", "kTRC")
-"""Tags that may hold a profile's only transform, where it is a spectral one or no processing elements."""
+"""Tags that may hold a profile's only transform, where it is for spectra or no processing elements."""
 
 
 @dataclass(frozen=True)
@@ -38,22 +39,25 @@ class Stage:
         """The tag's place, for messages."""
         return f"{self.profile.source}: tag {self.tag}"
 
-    def step(self) -> Process:
+    def step(self, interpolation: str) -> Process:
         """The tag as a step that is safe to run."""
-        return Process.checked(self.process, self.where)
+        return Process.checked(self.process, self.where, Resolver(self.profile, interpolation))
 
 
-def stages(chain: Sequence[Profile], intent: str) -> list[Stage]:
-    """The stages of a chain of profiles; which tag runs depends on the intent and on the neighbours."""
+def stages(chain: Sequence[Profile], intent: str, *, spectral: bool = True) -> list[Stage]:
+    """The stages of a chain of profiles; which tag runs depends on the intent and on the neighbours.
+
+    spectral: whether transforms to a spectral connection space go before those to a colorimetric one.
+    """
     found: list[Stage] = []
     for i, profile in enumerate(chain):
         source = found[-1].destination if found else None
         following = chain[i + 1].header.device_class if i + 1 < len(chain) else ""
-        found.append(_stage(profile, source, following, INTENTS.index(intent)))
+        found.append(_stage(profile, source, following, INTENTS.index(intent), spectral))
     return found
 
 
-def _stage(profile: Profile, before: Space | None, following: str, intent: int) -> Stage:
+def _stage(profile: Profile, before: Space | None, following: str, intent: int, spectral: bool) -> Stage:
     """The transform that `profile` contributes between the space before it and the profile after it."""
     device_class = profile.header.device_class
     if profile.header.version[0] < 5:
@@ -64,21 +68,22 @@ def _stage(profile: Profile, before: Space | None, following: str, intent: int) 
     if device_class == "mid " or to_mcs:
         tag, source, destination = "A2M0", device_space(profile), mcs_space(profile)
     elif device_class == "mvis":
-        tag = _by_intent(profile, ("M2B",), intent)
-        source, destination = mcs_space(profile), pcs_space(profile)
+        tag, destination = _connection(profile, "M2S", ("M2B",), intent, spectral)
+        source = mcs_space(profile)
     elif device_class == "mlnk":
         tag, source, destination = "M2A0", mcs_space(profile), device_space(profile)
     elif device_class == "link":
         tag, source, destination = "A2B0", device_space(profile), device_space(profile, field="pcs")
     elif device_class == "abst":
-        tag = _by_intent(profile, _families(profile, "D2B", "A2B"), intent)
-        source = destination = pcs_space(profile)
-    elif before is not None and before.kind == "pcs":
-        tag = _by_intent(profile, _families(profile, "B2D", "B2A"), intent)
-        source, destination = pcs_space(profile), device_space(profile)
+        spectra = spectral if before is None else before.kind == "spectral"
+        tag, source = _connection(profile, "D2B", ("D2B", "A2B"), intent, spectra)
+        destination = source
+    elif before is not None and before.kind in ("pcs", "spectral"):
+        tag, source = _connection(profile, "B2D", ("B2D", "B2A"), intent, before.kind == "spectral")
+        destination = device_space(profile)
     else:
-        tag = _by_intent(profile, _families(profile, "D2B", "A2B"), intent)
-        source, destination = device_space(profile), pcs_space(profile)
+        tag, destination = _connection(profile, "D2B", ("D2B", "A2B"), intent, spectral)
+        source = device_space(profile)
     process = _multi_process(profile, tag)
     for side, space, found in (("in", source, process.inputs), ("out", destination, process.outputs)):
         if found != len(space.names):
@@ -89,9 +94,19 @@ def _stage(profile: Profile, before: Space | None, following: str, intent: int) 
     return Stage(profile, tag, process, source, destination)
 
 
-def _families(profile: Profile, direct: str, colorimetric: str) -> tuple[str, ...]:
-    """The tags `direct` come first, but with a spectral connection space they hold for that one."""
-    return (colorimetric,) if profile.header.spectral_pcs else (direct, colorimetric)
+def _connection(
+    profile: Profile, spectra: str, colours: tuple[str, ...], intent: int, spectral: bool
+) -> tuple[str, Space]:
+    """The tag to run and the connection space on its other side.
+
+    With a spectral connection space, tags of the family `spectra` hold for that one; they go first where
+    `spectral` allows, and where the profile has no colorimetric space.
+    """
+    if not profile.header.spectral_pcs:
+        return _by_intent(profile, colours, intent), pcs_space(profile)
+    if any(f"{spectra}{n}" in profile for n in range(4)) and (spectral or not profile.header.pcs):
+        return _by_intent(profile, (spectra,), intent), spectral_space(profile)
+    return _by_intent(profile, tuple(c for c in colours if c != spectra), intent), pcs_space(profile)
 
 
 def _by_intent(profile: Profile, families: tuple[str, ...], intent: int) -> str:
@@ -104,7 +119,7 @@ def _by_intent(profile: Profile, families: tuple[str, ...], intent: int) -> str:
                 warnings.warn(
                     f"{profile.source}: no tag for the {INTENTS[intent]} intent; {tag} stands in",
                     ProfileWarning,
-                    stacklevel=5,
+                    stacklevel=6,
                 )
             return tag
     wanted = " or ".join(f"{family}0..3" for family in families)

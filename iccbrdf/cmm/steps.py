@@ -5,9 +5,9 @@ A channel is a NumPy array (one tile of pixels) or a scalar (uniform over the ti
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
@@ -22,6 +22,10 @@ from iccbrdf.icc import MultiProcess
 
 Channel = Any
 """A 1-D array over the tile, or a scalar."""
+
+
+Resolve: TypeAlias = Callable[[Any, str], Any]
+"""From an element and its place, for messages, to the element that runs in its stead."""
 
 
 class Step(Protocol):
@@ -48,23 +52,26 @@ class Process:
     """Operators on the longest path of its programs."""
 
     @classmethod
-    def checked(cls, process: MultiProcess, origin: str) -> Process:
+    def checked(cls, process: MultiProcess, origin: str, resolve: Resolve | None = None) -> Process:
         """After the checks that make it safe to run: elements that are known here, sound programs.
 
-        Raises ProfileError, LimitError or UnsupportedError.
+        `resolve` gives the element to run instead of one of the tag's.  Raises ProfileError, LimitError,
+        LinkError or UnsupportedError.
         """
         variables: set[str] = set()
         registers = process.inputs
         executed = 0
+        elements = []
         for i, element in enumerate(process.elements):
             place = f"{origin}: element {i}"
-            _check_runnable(element, place)
             programs = verify_element(element, where=f"{place} ({element.signature})")
+            elements.append(resolve(element, f"{place} ({element.signature})") if resolve else element)
+            _check_runnable(elements[-1], place)
             variables.update(*(p.environment for p in programs))
             registers = max(registers, element.outputs, *(p.max_depth + p.temporaries for p in programs))
             executed += sum(p.executed for p in programs)
         return cls(
-            origin, process.elements, tuple(sorted(variables.difference(RESERVED))), registers, executed
+            origin, tuple(elements), tuple(sorted(variables.difference(RESERVED))), registers, executed
         )
 
     def apply(self, channels: Sequence[Channel], env: Mapping[str, float], dtype: Any) -> list[Channel]:

@@ -370,6 +370,16 @@ class ColorantTable(Record):
         return tuple(colorant.name for colorant in self.colorants)
 
 
+OBSERVERS = {"CIE 1931 2 Degree Standard Observer": 1, "CIE 1964 10 Degree Standard Observer": 2}
+"""Observer -> id in spectralViewingConditionsType (ICC.2, 10.2.21); names of colour-science."""
+ILLUMINANTS = {
+    "D50": 1, "D65": 2, "D55": 5, "A": 6, "E": 7, "B": 11, "C": 12,
+    "FL1": 13, "FL2": 4, "FL3": 14, "FL4": 15, "FL5": 16, "FL6": 17,
+    "FL7": 18, "FL8": 8, "FL9": 19, "FL10": 20, "FL11": 21, "FL12": 22,
+}  # fmt: skip
+"""Illuminant -> id in spectralViewingConditionsType; names of colour-science."""
+
+
 @TAGS.add("svcn")
 @dataclass(frozen=True, eq=False)
 class ViewingConditions(Record):

@@ -15,7 +15,7 @@ from iccbrdf.icc.reader import Reader
 TONE_FUNCTIONS = Registry("tone function")
 
 
-@TONE_FUNCTIONS.add("tmf ")
+@TONE_FUNCTIONS.add("mapf")
 @dataclass(frozen=True, eq=False)
 class ToneFunction(Record):
     """y = gain * luminance * (x + offset) + black: `parameters` are gain, offset, black (type 0)."""
@@ -23,7 +23,7 @@ class ToneFunction(Record):
     parameters: tuple[float, float, float]
     type: int = 0
 
-    signature = "tmf "
+    signature = "mapf"
     layout = tag_layout(
         signature,
         Field("type", U16, valid=(0,)),
