@@ -53,7 +53,10 @@ class Job:
 
     height: Annotated[Path | None, Setting(to.path, "Height map of the relief, white on top.", "FILE")] = None
     relief: Annotated[
-        float, Setting(to.length, "Height of white (of 1, in a float file) above black.", "LENGTH")
+        float,
+        Setting(
+            to.length, "Height of white (of 1, in a float file) above black: in mm, or with a unit.", "LENGTH"
+        ),
     ] = 1.0
     pixel_pitch: Annotated[
         float | None, Setting(to.length, "Distance of the image's pixels on the print.", "LENGTH")
