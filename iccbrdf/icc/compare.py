@@ -27,7 +27,7 @@ _LONGEST = 60
 
 @dataclass(frozen=True)
 class Difference:
-    """`message` says it in a line; `data` is what it says, for JSON; `lines` are a unified diff of programs."""
+    """`message` says it in a line, `data` is for JSON, `lines` are a unified diff of programs."""
 
     place: str
     change: Literal["added", "removed", "changed"]
