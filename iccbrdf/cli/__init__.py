@@ -21,6 +21,8 @@ COMMANDS = {
     "build": "Make a MID and an MVIS profile from a primaries file.",
     "apply": "Map an image through profiles: XYZ TIFFs and PNG softproofs.",
     "dump": "Show what a profile holds.",
+    "validate": "Check whether profiles are sound.",
+    "diff": "Show what differs between two profiles.",
     "demo": "Softproof a relief print of a real landscape.",
     "info": "Show the back ends, and what would run a chain of profiles.",
 }
