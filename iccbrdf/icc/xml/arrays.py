@@ -1,0 +1,115 @@
+"""What several elements of the dialect hold: triples, spectral ranges, numeric arrays, grids of a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from iccbrdf.icc.tags import NUMBERS, NumberArray
+from iccbrdf.icc.xml.forms import Form, Forms, Inside, Numbers, Part, Seen
+from iccbrdf.icc.xml.node import Node, Target
+from iccbrdf.icc.xml.values import FLOAT32, U16, Codec, parse_numbers
+
+
+class Triple(Part):
+    """Three attributes as a tuple."""
+
+    def __init__(self, field: str, codec: Codec, names: tuple[str, str, str] = ("X", "Y", "Z")) -> None:
+        self.attributes = names
+        self.field = field
+        self.codec = codec
+
+    def read(self, node: Node, seen: Seen) -> None:
+        values = []
+        for name in self.attributes:
+            try:
+                values.append(self.codec.read(node.get(name)))
+            except ValueError as error:
+                raise node.error(f"{name}: {error}") from None
+        seen[self.field] = tuple(values)
+
+    def write(self, out: Target, record: Any) -> None:
+        for name, value in zip(self.attributes, getattr(record, self.field), strict=True):
+            out.set(name, self.codec.write(value))
+
+
+class Wavelengths(Part):
+    """The first and the last wavelength as a tuple, and how many there are (of a record: `count`)."""
+
+    attributes = ("start", "end", "steps")
+
+    def __init__(self, field: str, steps: str, count: Callable[[Any], int]) -> None:
+        self.field = field
+        self.steps = steps
+        self.count = count
+
+    def read(self, node: Node, seen: Seen) -> None:
+        values = []
+        for name, codec in zip(self.attributes, (FLOAT32, FLOAT32, U16), strict=True):
+            try:
+                values.append(codec.read(node.get(name)))
+            except ValueError as error:
+                raise node.error(f"{name}: {error}") from None
+        seen[self.field] = tuple(values[:2])
+        seen[self.steps] = values[2]
+
+    def write(self, out: Target, record: Any) -> None:
+        start, end = getattr(record, self.field)
+        out.set("start", FLOAT32.write(start))
+        out.set("end", FLOAT32.write(end))
+        out.set("steps", str(self.count(record)))
+
+
+class Grid(Part):
+    """The grid points of each input, or one number that holds for all of them."""
+
+    attributes = ("GridGranularity",)
+    children = ("GridPoints",)
+
+    def read(self, node: Node, seen: Seen) -> None:
+        points = node.child("GridPoints")
+        try:
+            text = points.text if points is not None else node.get("GridGranularity")
+            grid = tuple(parse_numbers(text, np.uint8).tolist())
+        except ValueError as error:
+            raise (points or node).error(f"grid points: {error}") from None
+        if points is None:
+            grid *= seen["inputs"]
+        if len(grid) != seen["inputs"]:
+            raise (points or node).error(f"found {len(grid)} grid points, expected {seen['inputs']}")
+        seen["grid"] = grid
+
+    def write(self, out: Target, record: Any) -> None:
+        out.child("GridPoints").write(" ".join(map(str, record.table.shape[:-1])))
+
+
+_NAMES = {
+    "ui08": "uInt8",
+    "ui16": "uInt16",
+    "ui32": "uInt32",
+    "ui64": "uInt64",
+    "fl16": "float16",
+    "fl32": "float32",
+    "fl64": "float64",
+    "sf32": "s15Fixed16",
+    "uf32": "u16Fixed16",
+}
+
+
+def _form(signature: str) -> Form:
+    # The ICC's tools take floating-point numbers in <Data> and fixed-point ones in <Array> alone.
+    name, alias = ("Data", "Array") if signature.startswith("fl") else ("Array", "Data")
+    memory = NUMBERS[signature][0]
+    return Form(
+        f"{_NAMES[signature]}ArrayType",
+        NumberArray,
+        Inside(name, Numbers("values", dtype=memory), aliases=(alias,)),
+        signature=signature,
+        aliases=(f"{_NAMES[signature]}NumberType",),
+    )
+
+
+NUMBER_FORMS = Forms("numeric array")
+NUMBER_FORMS.add(*map(_form, NUMBERS))

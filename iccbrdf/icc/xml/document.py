@@ -1,0 +1,124 @@
+"""A whole profile as an XML document and back."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from pathlib import Path
+from typing import Any
+
+from lxml import etree
+
+from iccbrdf.errors import ProfileError, ProfileWarning, UsageError
+from iccbrdf.icc.elements import MultiProcess
+from iccbrdf.icc.profile import Profile
+from iccbrdf.icc.source_tag import CalculatorSource, read_sources
+from iccbrdf.icc.xml import luts  # noqa: F401
+from iccbrdf.icc.xml.composite import NamedTags
+from iccbrdf.icc.xml.header import HEADER
+from iccbrdf.icc.xml.node import Files, Job, Node, Target, parse
+from iccbrdf.icc.xml.tag_names import TAG_NAMES
+
+_TAGS = NamedTags(TAG_NAMES, "PrivateTag")
+
+
+def profile_to_xml(profile: Profile) -> bytes:
+    """The profile as a document that `profile_from_xml` and the ICC's `iccFromXml` read.
+
+    Numbers are written so that they come back the same; a NaN loses what its bits say besides.  Tags of a
+    type that this library does not know are written as bytes.  What the private tag of
+    `iccbrdf.icc.source_tag` says about channels and temporaries becomes names in the programs.
+
+    Raises
+    ------
+    ProfileError
+        A tag is malformed, or a program is no sequence of known operators.
+    UnsupportedError
+        The profile holds what XML cannot, such as a control character in a text.
+    LimitError
+        The document would be too large for XML readers.
+    """
+    tags = {signature: profile[signature] for signature in profile}
+    root = etree.Element("IccProfile")
+    out = Target(root, Job(profile.source, _names(profile)))
+    try:
+        HEADER.write(out.child("Header"), profile.header)
+    except ValueError as error:
+        raise ProfileError(f"{profile.source}: header: {error}") from None
+    _TAGS.write(out.child("Tags"), tags)
+    etree.indent(root)
+    return etree.tostring(root, xml_declaration=True, encoding="UTF-8") + b"\n"
+
+
+def _names(profile: Profile) -> dict[int, CalculatorSource]:
+    """The names of calculators, by the `id` of their records; a broken private tag hinders nothing."""
+    try:
+        sources = read_sources(profile)
+    except ProfileError as error:
+        warnings.warn(f"{profile.source}: {error}; programs are written without names", ProfileWarning, 3)
+        return {}
+    names = {}
+    for source in sources:
+        tag = profile.get(source.tag)
+        if isinstance(tag, MultiProcess) and 0 <= source.element < len(tag.elements):
+            names[id(tag.elements[source.element])] = source
+    return names
+
+
+def profile_from_xml(
+    data: bytes, source: str = "<xml>", *, folder: str | os.PathLike[str] | None = None
+) -> Profile:
+    """The profile that a document describes, as `iccToXml` or `profile_to_xml` writes it.
+
+    Parameters
+    ----------
+    data
+        The document.  Its character encoding is the one that it declares.
+    source
+        Its name in messages.
+    folder
+        Where the files are that it names (imports, tables, texts, images).  They must lie in this folder or
+        below; without it, a document that names a file is refused.
+
+    Raises
+    ------
+    InputError
+        It is no well-formed XML, or a file that it names cannot be read.
+    ProfileError
+        It describes no profile: file, line and element, what was found and what was expected.
+    UnsupportedError
+        It has a tag type that this library does not read.
+    LimitError
+        It, with the files that it names, is larger or deeper than the limits.
+    """
+    root = parse(data, source, Files(None if folder is None else Path(folder)))
+    return _profile(root, source)
+
+
+def read_xml(path: str | os.PathLike[str], *, folder: str | os.PathLike[str] | None = None) -> Profile:
+    """Read a document from a file; `folder` (default: that of the file) and errors as `profile_from_xml`."""
+    try:
+        file = Path(path)
+        files = Files(file.parent if folder is None else Path(folder))
+    except TypeError as error:
+        raise UsageError(f"not the path of an XML file: {error}") from None
+    return _profile(parse(files.read(file), str(path), files), str(path))
+
+
+def _profile(root: Node, source: str) -> Profile:
+    if root.name != "IccProfile":
+        raise root.error("expected <IccProfile> as the outermost element")
+    root.expect((), ("Header", "Tags"))
+    header, tags = (_child(root, name) for name in ("Header", "Tags"))
+    found: dict[str, Any] = _TAGS.read(tags)
+    try:
+        return Profile(HEADER.read(header), found, source=source)
+    except UsageError as error:
+        raise tags.error(str(error)) from None
+
+
+def _child(root: Node, name: str) -> Node:
+    child = root.child(name)
+    if child is None:
+        raise root.error(f"no <{name}> found in it, expected one")
+    return child

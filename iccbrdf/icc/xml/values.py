@@ -1,0 +1,184 @@
+"""How single values are written: numbers that survive, signatures, hexadecimal digits, named choices."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from iccbrdf.errors import nearest
+from iccbrdf.icc.header import Colour
+
+Numbers: TypeAlias = npt.NDArray[Any]
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|inf(inity)?|nan)", re.IGNORECASE)
+_INFINITY = "1e999"
+"""A number that every reader takes for infinity; the ICC's tools take the letters `inf` for 0."""
+
+
+@dataclass(frozen=True)
+class Codec:
+    """A value as text: `read` raises ValueError with what was found and expected."""
+
+    read: Callable[[str], Any]
+    write: Callable[[Any], str]
+
+
+# Numbers -----------------------------------------------------------------------------------------------
+
+
+def decimal(value: Any) -> str:
+    """One number as `decimals` writes it."""
+    return decimals(np.asarray([value]))[0]
+
+
+def decimals(values: Numbers) -> list[str]:
+    """Each number of a flat array as text that gives it back in the array's precision; integers as such.
+
+    Single precision takes seven digits where these give the number back, else nine, which always do.
+    """
+    if values.dtype.kind in "ui":
+        return [str(v) for v in values.tolist()]
+    if values.dtype.itemsize == 8:
+        texts = [repr(v) for v in values.tolist()]
+    else:
+        values = values.astype(np.float32)
+        texts = [f"{v:.7g}" for v in values.tolist()]
+        with np.errstate(over="ignore"):
+            back = np.array([float(t) for t in texts], np.float64).astype(np.float32)
+        for index in np.flatnonzero(back != values):
+            texts[index] = f"{values[index]:.9g}"
+    for index in np.flatnonzero(~np.isfinite(values)):
+        value = values[index]
+        texts[index] = "nan" if np.isnan(value) else _INFINITY if value > 0 else f"-{_INFINITY}"
+    return texts
+
+
+def parse_numbers(text: str, dtype: npt.DTypeLike) -> Numbers:
+    """The numbers in `text`, between blanks or commas, as unsigned integers of `dtype` or as float64."""
+    kind = np.dtype(dtype)
+    tokens = text.replace(",", " ").split()
+    for token in tokens:
+        if not _NUMBER.fullmatch(token):
+            raise ValueError(f"found {token!r:.40}, expected a number")
+    if kind.kind != "u":
+        return np.array([float(token) for token in tokens], np.float64)
+    whole = [_integer(token) for token in tokens]
+    limit = 256**kind.itemsize
+    for number in whole:
+        if not 0 <= number < limit:
+            raise ValueError(f"found {number}, expected 0 to {limit - 1}")
+    return np.array(whole, kind)
+
+
+def _integer(token: str) -> int:
+    try:
+        return int(token)
+    except ValueError:
+        number = float(token)
+    if not number.is_integer():
+        raise ValueError(f"found {token}, expected an integer") from None
+    return int(number)
+
+
+def _float(text: str) -> float:
+    text = text.strip()
+    if not _NUMBER.fullmatch(text):
+        raise ValueError(f"found {text!r:.40}, expected a number")
+    return float(text)
+
+
+def unsigned(bits: int) -> Codec:
+    """An integer of so many bits."""
+
+    def read(text: str) -> int:
+        if not re.fullmatch(r"\s*\d{1,20}\s*", text) or int(text) >= 1 << bits:
+            raise ValueError(f"found {text!r:.40}, expected an integer from 0 to {(1 << bits) - 1}")
+        return int(text)
+
+    return Codec(read, str)
+
+
+FLOAT32 = Codec(_float, lambda value: decimal(np.float32(value)))
+FIXED16 = Codec(_float, lambda value: f"{value:.6f}".rstrip("0").rstrip("."))
+"""In steps of 1/65536, which six decimals tell apart."""
+U8, U16, U32 = unsigned(8), unsigned(16), unsigned(32)
+
+
+# Signatures, bytes, choices ----------------------------------------------------------------------------
+
+
+def signature_text(data: bytes) -> str:
+    """Four bytes as characters, none for zeros, else as eight hexadecimal digits and `h`."""
+    if not any(data):
+        return ""
+    plain = all(0x20 <= byte < 0x7F and byte != ord(":") for byte in data)
+    return data.decode("ascii") if plain else data.hex().upper() + "h"
+
+
+def signature_bytes(text: str) -> bytes:
+    """The inverse; fewer than four characters are filled up with blanks, and `nc000a` has a count in it."""
+    if len(text) <= 4 and text.isascii():
+        return text.encode("ascii").ljust(4) if text else bytes(4)
+    if re.fullmatch(r"[0-9A-Fa-f]{8}h?", text):
+        return bytes.fromhex(text[:8])
+    if re.fullmatch(r"[a-z]{2}[0-9A-Fa-f]{4}", text):
+        return text[:2].encode("ascii") + bytes.fromhex(text[2:])
+    raise ValueError(f"found {text!r:.40}, expected up to four characters, or eight hexadecimal digits and h")
+
+
+def _read_signature(text: str) -> str:
+    data = signature_bytes(text)
+    return data.decode("latin-1") if any(data) else ""
+
+
+SIGNATURE = Codec(_read_signature, lambda value: signature_text(value.encode("latin-1")))
+"""Four characters, "" for zeros."""
+
+_COLOUR = Colour()
+COLOUR = Codec(
+    lambda text: _COLOUR.decode(signature_bytes(text)),
+    lambda value: value if len(value) == 6 else signature_text(_COLOUR.encode(value)),
+)
+"""A colour space of the header; one with a channel count as two letters and four hexadecimal digits."""
+
+
+def parse_hex(text: str) -> bytes:
+    """Bytes of hexadecimal digits, with blanks anywhere."""
+    try:
+        return bytes.fromhex("".join(text.split()))
+    except ValueError:
+        raise ValueError(f"found {text.strip()!r:.40}, expected pairs of hexadecimal digits") from None
+
+
+def _hex_lines(data: bytes) -> str:
+    return "\n".join(["", *(data[i : i + 32].hex() for i in range(0, len(data), 32)), ""])
+
+
+HEX = Codec(parse_hex, lambda data: data.hex().upper())
+"""Bytes on one line."""
+HEX_LINES = Codec(parse_hex, _hex_lines)
+"""Bytes, 32 a line."""
+RESERVED = Codec(
+    lambda text: U32.read(text).to_bytes(4, "big"), lambda data: str(int.from_bytes(data, "big"))
+)
+"""Four bytes as an integer."""
+
+
+def choice(names: Mapping[int, tuple[str, ...]]) -> Codec:
+    """A number that stands for one of several names, of which the first is written; others as digits."""
+    values = {name: value for value, several in names.items() for name in several}
+
+    def read(text: str) -> int:
+        text = text.strip()
+        if text.isdecimal() and len(text) <= 10:
+            return int(text)
+        if text not in values:
+            raise ValueError(f"found {text!r:.60}: {nearest(text, values)}")
+        return values[text]
+
+    return Codec(read, lambda value: names[value][0] if value in names else str(value))
