@@ -1,8 +1,8 @@
 """The NumPy back end: a schedule as steps of ufuncs on tiles of pixels.
 
-A kernel holds no text and no generated source: its code is a list of (function, which operands), made
-once from the graph.  A tile's pixels are brought into planes, every step writes a whole plane, and the
-outputs are written back pixel by pixel.  The tile is as large as keeps all planes within the cache.
+A kernel's code is a list of (function, which operands), made once from the graph: no text is generated,
+and none evaluated.  A tile's channels are copied into planes, every step writes a whole plane, and the
+outputs are copied from planes to pixels.
 """
 
 from __future__ import annotations
@@ -18,10 +18,8 @@ from iccbrdf.calc.buffers import Allocation, Fork, Kind, Operand, Place, Steps, 
 from iccbrdf.calc.numpy_lowering import lower
 from iccbrdf.calc.schedule import Schedule
 
-CACHE = 1 << 20
-"""Bytes of the buffers together: what a core's second-level cache holds beside the pixels themselves."""
-LEAST_TILE, LARGEST_TILE = 1 << 12, 1 << 14
-"""Pixels: below, calling the ufuncs costs more than they do; above, nothing is gained."""
+TILE = 1 << 14
+"""Pixels: with fewer, calling the ufuncs costs more than they do; with more, the buffers leave the cache."""
 MAX_VALUES = 1 << 24
 """Numbers in the buffers together: programs may ask for so many buffers that fewer pixels must do."""
 
@@ -47,10 +45,7 @@ class NumpyKernel:
         self._channels, self._outputs = plan.channels, len(plan.graph.outputs)
         self._layout = _Layout(plan, allocate(steps))
         self._code = _bound(steps, self._layout)
-        bytes_per_pixel = self.registers * self._dtype.itemsize
-        fitting = 1 << (CACHE // max(bytes_per_pixel, 1)).bit_length() - 1
-        largest = MAX_VALUES // max(self.registers, 1)
-        self.tile = max(1, min(max(fitting, LEAST_TILE), LARGEST_TILE, largest))
+        self.tile = min(TILE, max(1, MAX_VALUES // max(1, self.registers)))
         self._idle: list[_Planes] = []
 
     @property

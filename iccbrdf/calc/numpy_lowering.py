@@ -14,7 +14,7 @@ import numpy as np
 
 from iccbrdf.calc import elements
 from iccbrdf.calc.buffers import Code, Fork, Kind, Operand, Place, Register, Step, Steps, View
-from iccbrdf.calc.graph import Node
+from iccbrdf.calc.graph import Node, is_truth
 from iccbrdf.calc.meanings import solve
 from iccbrdf.calc.numpy_functions import LOGIC, MADE, NUMBERS, TESTS, copy, select, widened
 from iccbrdf.calc.schedule import Block, Branch, Schedule
@@ -64,18 +64,18 @@ class _Lowering:
     def _number(self, node: Node) -> Operand:
         if node.op == "const":
             return self.code.number(node.detail[0])
-        return self._form(node, View.NUMBER, self._as_number)
-
-    def _as_number(self, node: Node) -> Operand:
-        return self.code.do(copy, self._mask(node))
+        if is_truth(node):
+            return self._form(node, View.NUMBER, lambda node: self.code.do(copy, self._mask(node)))
+        return self._known[node, View.NUMBER]
 
     def _mask(self, node: Node) -> Operand:
         if node.op == "const":
             return np.bool_(node.detail[0] >= 0.5)
-        return self._form(node, View.MASK, self._as_mask)
-
-    def _as_mask(self, node: Node) -> Operand:
-        return self.code.test(np.greater_equal, self._number(node), self.code.number(0.5))
+        if is_truth(node):
+            return self._known[node, View.MASK]
+        half = self.code.number(0.5)
+        test = self.code.test
+        return self._form(node, View.MASK, lambda node: test(np.greater_equal, self._number(node), half))
 
     def _wide(self, node: Node) -> Operand:
         return self._form(node, View.WIDE, lambda node: widened(self.code, self._mask(node)))
