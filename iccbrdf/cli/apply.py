@@ -7,15 +7,18 @@ from typing import Any, Literal
 
 import click
 
+from iccbrdf import images
 from iccbrdf.build import image_link, last_slope
 from iccbrdf.cli.options import emit, environment, force_option, json_option, name_list, scene_options
 from iccbrdf.cli.pipeline import Output, arranged_channels, check_outputs, run
 from iccbrdf.cmm import INTENTS, link
 from iccbrdf.errors import UsageError
 from iccbrdf.icc import read_profile
-from iccbrdf.images import ImageSource, Samples, WithNormals, open_tiff
+from iccbrdf.images import ImageSource, Samples, WithNormals, open_tiff, processors
 from iccbrdf.images.blocks import Array
-from iccbrdf.images.normals import height_to_normals, read_height_map, read_normal_map
+
+MOST_WORKERS = 8
+"""Unless more are asked for: reading and writing keep no more busy, and each takes memory."""
 
 EPILOG = """
 \b
@@ -47,10 +50,10 @@ def read_relief(
     if (height_map is None) != (relief is None) or (height_map is None) != (pitch is None):
         raise UsageError("--height, --relief and --pixel-pitch belong together")
     if normal_map is not None:
-        return read_normal_map(normal_map, "opengl" if green == "up" else "directx")
+        return images.read_normal_map(normal_map, "opengl" if green == "up" else "directx")
     if height_map is None or relief is None or pitch is None:
         return None
-    return height_to_normals(read_height_map(height_map, relief), pitch)
+    return images.height_to_normals(images.read_height_map(height_map, relief), pitch)
 
 
 @click.command("apply", epilog=EPILOG)
@@ -86,7 +89,9 @@ def read_relief(
     "--depth", type=click.Choice(("8", "16")), default="8", show_default=True, help="Bits of a PNG."
 )
 @click.option("--double", is_flag=True, help="Compute in float64.")
-@click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Threads that compute.")
+@click.option("--workers", type=click.IntRange(1), default=lambda: min(processors(), MOST_WORKERS),
+              show_default=f"the processors, at most {MOST_WORKERS}",
+              help="Blocks of the image that are read and computed at a time.")  # fmt: skip
 @force_option
 @json_option
 def command(

@@ -22,7 +22,7 @@ from iccbrdf.cmm import Transform, standard_XYZ
 from iccbrdf.errors import UsageError, nearest
 from iccbrdf.files import check_target
 from iccbrdf.icc import Profile
-from iccbrdf.images import ImageSource, Place, create_png, create_tiff, in_order
+from iccbrdf.images import ImageSource, Place, create_tiff, in_order
 from iccbrdf.images.float_range import all_within
 
 TIFF_SUFFIXES = (".tif", ".tiff")
@@ -177,6 +177,9 @@ def _steeper(data: npt.NDArray[Any], samples: str, names: Sequence[str], limit: 
 
 def _open(output: Output, source: ImageSource, transform: Transform, overwrite: bool) -> Any:
     if output.is_png:
+        # Imported late, as codecs and displays are not needed for a TIFF.
+        from iccbrdf.images.display import create_png
+
         return create_png(
             output.path,
             source.height,
