@@ -8,6 +8,7 @@ from calc_programs import INPUTS, OUTPUTS, random_program
 from graph_examples import calculator, hard_pixels, interpreted, same_bits, scheduled, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from icc_examples import conformance_profiles
 
 from iccbrdf import read_profile
 from iccbrdf.calc import numpy_functions
@@ -17,7 +18,7 @@ from iccbrdf.calc.numpy_backend import compile_numpy
 from iccbrdf.calc.operators import OPERATORS
 from iccbrdf.calc.program import parse
 from iccbrdf.calc.schedule import Branch, Schedule, schedule, uniform_values
-from iccbrdf.icc import Clut, CurveSet, SampledCurve, TintArray
+from iccbrdf.icc import Clut, CurveSet, Profile, SampledCurve, TintArray
 from iccbrdf.resources import folder
 
 ENVIRONMENTS = ({}, {"litX": 0.75}, {"litX": -0.0, "a": float("nan")})
@@ -343,3 +344,13 @@ def test_elements(dtype):
     pixels = hard_pixels(300, 3, dtype)
     plan = scheduled(element, dtype)
     assert same_bits(run(plan, pixels), interpreted(element, pixels))
+
+
+@pytest.mark.filterwarnings("ignore::iccbrdf.ProfileWarning")
+def test_conformance_cases(rounded_once):
+    for name, data in conformance_profiles():
+        profile = Profile.from_bytes(data, name)
+        (element,) = profile["A2M0"].elements
+        pixels = hard_pixels(100, element.inputs)
+        for env in ENVIRONMENTS:
+            assert same_bits(run(scheduled(element), pixels, env), interpreted(element, pixels, env)), name

@@ -131,7 +131,7 @@ def test_rounded_operators_with_a_constant(op, functions):
             assert_close(computed(op, columns, np.float32), wanted(op, columns, np.float32))
 
 
-@pytest.mark.parametrize("exponent", [3, 4, 5, 6, 7])
+@pytest.mark.parametrize("exponent", [3, 4, 5, 6, 7, 8])
 def test_whole_powers_for_every_mantissa(exponent):
     values = np.arange(0x3F800000, 0x40000000, dtype=np.uint32).view(np.float32)
     found = computed("pow", [values, exponent], np.float32)
