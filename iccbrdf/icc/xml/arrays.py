@@ -10,7 +10,7 @@ import numpy as np
 from iccbrdf.icc.tags import NUMBERS, NumberArray
 from iccbrdf.icc.xml.forms import Form, Forms, Inside, Numbers, Part, Seen
 from iccbrdf.icc.xml.node import Node, Target
-from iccbrdf.icc.xml.values import FLOAT32, U16, Codec, parse_numbers
+from iccbrdf.icc.xml.values import FLOAT32, U8, U16, Codec, numbers
 
 
 class Triple(Part):
@@ -22,13 +22,7 @@ class Triple(Part):
         self.codec = codec
 
     def read(self, node: Node, seen: Seen) -> None:
-        values = []
-        for name in self.attributes:
-            try:
-                values.append(self.codec.read(node.get(name)))
-            except ValueError as error:
-                raise node.error(f"{name}: {error}") from None
-        seen[self.field] = tuple(values)
+        seen[self.field] = tuple(node.value(self.codec, node.get(name), name) for name in self.attributes)
 
     def write(self, out: Target, record: Any) -> None:
         for name, value in zip(self.attributes, getattr(record, self.field), strict=True):
@@ -46,14 +40,8 @@ class Wavelengths(Part):
         self.count = count
 
     def read(self, node: Node, seen: Seen) -> None:
-        values = []
-        for name, codec in zip(self.attributes, (FLOAT32, FLOAT32, U16), strict=True):
-            try:
-                values.append(codec.read(node.get(name)))
-            except ValueError as error:
-                raise node.error(f"{name}: {error}") from None
-        seen[self.field] = tuple(values[:2])
-        seen[self.steps] = values[2]
+        seen[self.field] = tuple(node.value(FLOAT32, node.get(name), name) for name in ("start", "end"))
+        seen[self.steps] = node.value(U16, node.get("steps"), "steps")
 
     def write(self, out: Target, record: Any) -> None:
         start, end = getattr(record, self.field)
@@ -70,13 +58,10 @@ class Grid(Part):
 
     def read(self, node: Node, seen: Seen) -> None:
         points = node.child("GridPoints")
-        try:
-            text = points.text if points is not None else node.get("GridGranularity")
-            grid = tuple(parse_numbers(text, np.uint8).tolist())
-        except ValueError as error:
-            raise (points or node).error(f"grid points: {error}") from None
-        if points is None:
-            grid *= seen["inputs"]
+        if points is not None:
+            grid = tuple(points.value(numbers(np.uint8), points.text).tolist())
+        else:
+            grid = (node.value(U8, node.get("GridGranularity"), "GridGranularity"),) * seen["inputs"]
         if len(grid) != seen["inputs"]:
             raise (points or node).error(f"found {len(grid)} grid points, expected {seen['inputs']}")
         seen["grid"] = grid

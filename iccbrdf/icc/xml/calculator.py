@@ -12,6 +12,7 @@ from iccbrdf.icc.xml import node as xml
 from iccbrdf.icc.xml.elements import CHANNELS, ELEMENT_FORMS
 from iccbrdf.icc.xml.forms import Form, Part, Seen
 from iccbrdf.icc.xml.language import (
+    SIZED_NAMES,
     Declarations,
     Macro,
     Span,
@@ -19,9 +20,9 @@ from iccbrdf.icc.xml.language import (
     identifiers,
     is_name,
     named,
-    sized_names,
 )
 from iccbrdf.icc.xml.node import Node, Target
+from iccbrdf.icc.xml.values import U32
 
 MAX_IMPORTS = 64
 """Files that one calculator may import, one by way of another counted too."""
@@ -66,13 +67,10 @@ class _Program(Part):
 
 
 def _names(node: Node, attribute: str, channels: int) -> dict[str, Span]:
-    try:
-        names = sized_names(node.attributes.get(attribute, ""))
-        count = sum(span.size for span in names.values())
-        if count > channels:
-            raise ValueError(f"found {count} channels, expected up to {channels}")
-    except ValueError as error:
-        raise node.error(f"{attribute}: {error}") from None
+    names: dict[str, Span] = node.value(SIZED_NAMES, node.attributes.get(attribute, ""), attribute)
+    count = sum(span.size for span in names.values())
+    if count > channels:
+        raise node.error(f"{attribute}: found {count} channels, expected up to {channels}")
     return names
 
 
@@ -102,13 +100,13 @@ class _Reading:
 
     def _imports(self, node: Node, imported: bool) -> None:
         self._check(node, "Import", ("Filename",))
-        path, data = node.files.named(node, node.get("Filename"))
+        path, data = node.document.named(node, node.get("Filename"))
         if str(path) in self.imported:
             return
         if len(self.imported) == MAX_IMPORTS:
             raise node.error(f"more than {MAX_IMPORTS} imported files", kind=LimitError)
         self.imported.add(str(path))
-        root = xml.parse(data, str(path), node.files)
+        root = xml.parse(data, str(path), node.document)
         root.records = node.records
         if root.name != "IccCalcImport":
             raise root.error("expected <IccCalcImport> as the outermost element")
@@ -118,7 +116,7 @@ class _Reading:
     def _variables(self, node: Node, imported: bool) -> None:
         self._check(node, "Declare", ("Name", "Size", "Position"))
         name = self._name(node, self.declared.variables)
-        members = self._spans(node, node.text)
+        members = node.value(SIZED_NAMES, node.text)
         size = max([self._number(node, "Size", 1), 1, *(m.first + m.size for m in members.values())])
         position = self._number(node, "Position", -1)
         if imported and position > 0:
@@ -135,7 +133,7 @@ class _Reading:
         name = self._name(node, self.declared.macros)
         if not node.text.strip():
             raise node.error(f"macro {name!r}: found no text, expected operators")
-        local = self._spans(node, node.attributes.get("Local", ""))
+        local = node.value(SIZED_NAMES, node.attributes.get("Local", ""), "Local")
         self.declared.macros[name] = Macro(node, node.text, local)
 
     def _subelements(self, node: Node, imported: bool) -> None:
@@ -164,18 +162,7 @@ class _Reading:
     @staticmethod
     def _number(node: Node, attribute: str, default: int) -> int:
         text = node.attributes.get(attribute)
-        if text is None:
-            return default
-        if not text.isdecimal() or len(text) > 5 or int(text) > SLOTS:
-            raise node.error(f"{attribute}: found {text!r:.20}, expected an integer from 0 to {SLOTS}")
-        return int(text)
-
-    @staticmethod
-    def _spans(node: Node, text: str) -> dict[str, Span]:
-        try:
-            return sized_names(text)
-        except ValueError as error:
-            raise node.error(str(error)) from None
+        return default if text is None else int(node.value(U32, text, attribute))
 
 
 def _write_names(out: Target, names: CalculatorSource) -> None:

@@ -7,15 +7,17 @@ from typing import Any
 
 from iccbrdf.errors import nearest
 from iccbrdf.icc.composite import Member, TagStruct
+from iccbrdf.icc.layout import shown
 from iccbrdf.icc.reader import Reader
 from iccbrdf.icc.tags import TAGS, TagArray, Unknown
 from iccbrdf.icc.xml.forms import Form, Forms, Part, Seen
 from iccbrdf.icc.xml.node import Node, Target
 from iccbrdf.icc.xml.tag_names import ARRAYS, MEMBERS, STRUCTURES
-from iccbrdf.icc.xml.values import HEX_LINES, SIGNATURE, signature_bytes
+from iccbrdf.icc.xml.values import HEX_LINES, SIGNATURE, Codec, signature_bytes, signature_text
 
 _SIGNATURES = "TagSignature"
 _PRIVATE = "PrivateType"
+_FOUR_BYTES = Codec(signature_bytes, signature_text)
 _NULL = "NullTag"
 """An array position that holds nothing, for which the ICC's dialect has no element."""
 
@@ -48,11 +50,8 @@ class _TypeForms(Forms):
             return super().read(node)
         node.expect(("type", "reserved"), ("UnknownData",))
         data = node.child("UnknownData")
-        try:
-            signature = signature_bytes(node.get("type"))
-            content = HEX_LINES.read(data.text if data is not None else "")
-        except ValueError as error:
-            raise node.error(str(error)) from None
+        signature = node.value(_FOUR_BYTES, node.get("type"), "type")
+        content = node.value(HEX_LINES, data.text if data is not None else "")
         return TAGS.read(Reader(signature + content, node.source, f"line {node.line}"))
 
     def write(self, out: Target, record: Any) -> None:
@@ -88,8 +87,8 @@ class NamedTags:
                 signatures, tag = self._legacy(child)
             for signature in signatures:
                 if signature in tags:
-                    raise child.error(f"found tag {signature!r} a second time, expected every one once")
-                tags[signature] = tag
+                    child.warn(f"a second tag {shown(signature)!r} is ignored")
+                tags.setdefault(signature, tag)
         return tags
 
     def _signature(self, node: Node) -> str:
@@ -136,10 +135,7 @@ class NamedTags:
 
 
 def _signature(node: Node, text: str) -> str:
-    try:
-        return str(SIGNATURE.read(text))
-    except ValueError as error:
-        raise node.error(str(error)) from None
+    return str(node.value(SIGNATURE, text))
 
 
 class _Members(Part):

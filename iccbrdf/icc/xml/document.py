@@ -16,7 +16,7 @@ from iccbrdf.icc.source_tag import CalculatorSource, read_sources
 from iccbrdf.icc.xml import luts  # noqa: F401
 from iccbrdf.icc.xml.composite import NamedTags
 from iccbrdf.icc.xml.header import HEADER
-from iccbrdf.icc.xml.node import Files, Job, Node, Target, parse
+from iccbrdf.icc.xml.node import Document, Job, Node, Target, parse
 from iccbrdf.icc.xml.tag_names import TAG_NAMES
 
 _TAGS = NamedTags(TAG_NAMES, "PrivateTag")
@@ -66,7 +66,11 @@ def _names(profile: Profile) -> dict[int, CalculatorSource]:
 
 
 def profile_from_xml(
-    data: bytes, source: str = "<xml>", *, folder: str | os.PathLike[str] | None = None
+    data: bytes,
+    source: str = "<xml>",
+    *,
+    folder: str | os.PathLike[str] | None = None,
+    strict: bool = False,
 ) -> Profile:
     """The profile that a document describes, as `iccToXml` or `profile_to_xml` writes it.
 
@@ -79,6 +83,10 @@ def profile_from_xml(
     folder
         Where the files are that it names (imports, tables, texts, images).  They must lie in this folder or
         below; without it, a document that names a file is refused.
+    strict
+        Refuse what the ICC's tools pass over without a word: attributes and elements that are not known,
+        numbers with something behind them, gaps between the segments of a curve.  Otherwise it is ignored
+        with a ProfileWarning.
 
     Raises
     ------
@@ -91,18 +99,23 @@ def profile_from_xml(
     LimitError
         It, with the files that it names, is larger or deeper than the limits.
     """
-    root = parse(data, source, Files(None if folder is None else Path(folder)))
-    return _profile(root, source)
+    document = Document(None if folder is None else Path(folder), strict=strict)
+    return _profile(parse(data, source, document), source)
 
 
-def read_xml(path: str | os.PathLike[str], *, folder: str | os.PathLike[str] | None = None) -> Profile:
-    """Read a document from a file; `folder` (default: that of the file) and errors as `profile_from_xml`."""
+def read_xml(
+    path: str | os.PathLike[str],
+    *,
+    folder: str | os.PathLike[str] | None = None,
+    strict: bool = False,
+) -> Profile:
+    """Read a document from a file; `folder` is that of the file by default.  Else as `profile_from_xml`."""
     try:
         file = Path(path)
-        files = Files(file.parent if folder is None else Path(folder))
+        document = Document(file.parent if folder is None else Path(folder), strict=strict)
     except TypeError as error:
         raise UsageError(f"not the path of an XML file: {error}") from None
-    return _profile(parse(files.read(file), str(path), files), str(path))
+    return _profile(parse(document.read(file), str(path), document), str(path))
 
 
 def _profile(root: Node, source: str) -> Profile:

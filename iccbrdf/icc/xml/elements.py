@@ -69,10 +69,7 @@ class _Type(Attribute):
 
     def read(self, node: Node, seen: Seen) -> None:
         name = "type" if "type" in node.attributes else "Type"
-        try:
-            seen["signature"] = SIGNATURE.read(node.get(name))
-        except ValueError as error:
-            raise node.error(f"{name}: {error}") from None
+        seen["signature"] = node.value(SIGNATURE, node.get(name), name)
 
     def write(self, out: Target, record: UnknownElement) -> None:
         for name in self.attributes:
@@ -128,29 +125,27 @@ class _Segments(Part):
     children = None
 
     def read(self, node: Node, seen: Seen) -> None:
-        segments, ends = [], []
+        segments, starts = [], []
         expected: float = -np.inf
         for child in node:
             start, end = (self._end(child, name) for name in _Ends.attributes)
             if start != expected:
-                raise child.error(f"Start: found {start}, expected {expected}, where the one before ends")
+                child.warn(f"Start: found {start}, expected {expected}, where the one before ends")
             segments.append(SEGMENT_FORMS.read(child))
-            ends.append(end)
+            starts.append(start)
             expected = end
         if expected != np.inf:
-            raise node.error(f"found segments up to {expected}, expected them up to +infinity")
+            node.warn(f"found segments up to {expected}, expected them up to +infinity")
+        # Where ends and starts differ, the ICC's tools keep the starts, but for the first.
         seen["segments"] = tuple(segments)
-        seen["breakpoints"] = tuple(ends[:-1])
+        seen["breakpoints"] = tuple(starts[1:])
 
     @staticmethod
     def _end(node: Node, name: str) -> float:
         text = node.get(name)
         if text.startswith(("-inf", "+inf")):
             return float(text[:4])
-        try:
-            return float(np.float32(FLOAT32.read(text)))
-        except ValueError as error:
-            raise node.error(f"{name}: {error}") from None
+        return float(np.float32(node.value(FLOAT32, text, name)))
 
     def write(self, out: Target, record: SegmentedCurve) -> None:
         ends = ["-infinity", *(FLOAT32.write(point) for point in record.breakpoints), "+infinity"]

@@ -18,7 +18,7 @@ from iccbrdf.icc.fields import ENCODINGS
 from iccbrdf.icc.layout import shown
 from iccbrdf.icc.reader import MAX_DEPTH
 from iccbrdf.icc.xml.node import Node, Target
-from iccbrdf.icc.xml.values import Codec, decimals, parse_numbers
+from iccbrdf.icc.xml.values import U16, Codec, choice, decimals, numbers
 
 Seen: TypeAlias = dict[str, Any]
 """The values of a record read so far."""
@@ -69,10 +69,7 @@ class Attribute(Part):
         if name not in node.attributes and self.default is not REQUIRED:
             seen[self.field] = self.default
             return
-        try:
-            seen[self.field] = self.codec.read(node.get(name))
-        except ValueError as error:
-            raise node.error(f"{name}: {error}") from None
+        seen[self.field] = node.value(self.codec, node.get(name), name)
 
     def write(self, out: Target, record: Any) -> None:
         value = getattr(record, self.field)
@@ -88,10 +85,7 @@ class Content(Part):
         self.codec = codec
 
     def read(self, node: Node, seen: Seen) -> None:
-        try:
-            seen[self.field] = self.codec.read(node.text)
-        except ValueError as error:
-            raise node.error(str(error)) from None
+        seen[self.field] = node.value(self.codec, node.text)
 
     def write(self, out: Target, record: Any) -> None:
         out.write(self.codec.write(getattr(record, self.field)))
@@ -117,10 +111,7 @@ class Numbers(Part):
         self.dtype = np.dtype(dtype)
 
     def read(self, node: Node, seen: Seen) -> None:
-        try:
-            values = read_numbers(node, self.dtype, seen.get("encoding", 0))
-        except ValueError as error:
-            raise node.error(str(error)) from None
+        values = read_numbers(node, self.dtype, seen.get("encoding", 0))
         if self.shape is not None:
             shape = self.shape(seen)
             expected = int(np.prod(shape, dtype=object))
@@ -153,26 +144,29 @@ def read_numbers(node: Node, dtype: npt.DTypeLike, encoding: int) -> npt.NDArray
     """
     filename = node.attributes.get("Filename") or node.attributes.get("File")
     if not filename:
-        return parse_numbers(" ".join([node.text, *(child.text for child in node)]), dtype)
-    path, data = node.files.named(node, filename)
-    stated = node.attributes.get("FileEncoding")
-    encodings = {"float": 0, "int16": 2, "int8": 3}
-    if stated is not None and stated not in encodings:
-        raise ValueError(f"FileEncoding: found {stated!r}: {nearest(stated, encodings)}")
-    encoding = encodings.get(stated or "", int(node.attributes.get("StorageType", encoding)))
+        return node.value(numbers(dtype), " ".join([node.text, *(child.text for child in node)]))
+    for name, codec in (("FileEncoding", _FILE_ENCODING), ("StorageType", U16)):
+        if name in node.attributes:
+            encoding = node.value(codec, node.attributes[name], name)
+            break
+    if encoding >= len(ENCODINGS):
+        raise node.error(f"StorageType: found {encoding}, expected 0 to {len(ENCODINGS) - 1}")
     stored, scale = ENCODINGS[encoding]
-    kind = node.attributes.get("Format", "text")
-    try:
-        if kind == "text":
-            values = parse_numbers(data.decode("utf-8", "replace"), dtype)
-        elif kind == "binary":
-            order = "<" if node.attributes.get("Endian") == "little" else ">"
-            values = np.frombuffer(data, np.dtype(stored).newbyteorder(order)).astype(np.float64)
-        else:
-            raise ValueError(f"Format: found {kind!r}: {nearest(kind, ('text', 'binary'))}")
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
+    binary = node.value(_FILE_FORMAT, node.attributes.get("Format", "text"), "Format")
+    path, data = node.document.named(node, filename)
+    if binary:
+        order = "<" if node.attributes.get("Endian") == "little" else ">"
+        kind = np.dtype(stored).newbyteorder(order)
+        if len(data) % kind.itemsize:
+            raise node.error(f"{path}: found {len(data)} bytes, no whole number of values")
+        values = np.frombuffer(data, kind).astype(np.float64)
+    else:
+        values = node.value(numbers(dtype), data.decode("utf-8", "replace"), str(path))
     return values / scale if scale > 1 else values
+
+
+_FILE_ENCODING = choice({0: ("float",), 2: ("int16",), 3: ("int8",)})
+_FILE_FORMAT = choice({0: ("text",), 1: ("binary",)})
 
 
 class Inside(Part):

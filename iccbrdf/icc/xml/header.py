@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -57,6 +58,15 @@ def _read_created(text: str) -> tuple[int, ...]:
     return Header.created if text.strip().lower() == "now" else tuple(DATE.read(text))
 
 
+def _read_hex_number(text: str) -> int:
+    if not re.fullmatch(r"(0x)?[0-9A-Fa-f]{1,16}", text.strip()):
+        raise ValueError(f"found {text!r:.40}, expected hexadecimal digits")
+    return int(text, 16)
+
+
+_HEX_NUMBER = Codec(_read_hex_number, hex)
+
+
 class _Bits(Part):
     """A number whose bits are attributes of one element; those without a name are in `rest`, hexadecimal.
 
@@ -77,12 +87,8 @@ class _Bits(Part):
             if state.lower() not in (states[0].lower(), states[1].lower()):
                 raise node.error(f"{name}: found {state!r:.40}: {nearest(state, states)}")
             value |= (state.lower() == states[1].lower()) << bit
-        rest = node.attributes.get(self.rest, "0")
-        try:
-            value |= int(rest, 16)
-        except ValueError:
-            raise node.error(f"{self.rest}: found {rest!r:.40}, expected hexadecimal digits") from None
-        seen[self.field] = value
+        rest = node.value(_HEX_NUMBER, node.attributes.get(self.rest, "0"), self.rest)
+        seen[self.field] = value | rest
 
     def write(self, out: Target, record: Header) -> None:
         value = getattr(record, self.field)

@@ -18,6 +18,7 @@ from iccbrdf.calc.operators import OPERATORS, Operand
 from iccbrdf.errors import IccBrdfError, LimitError, ProfileError, nearest
 from iccbrdf.icc.source_tag import SLOTS, CalculatorSource
 from iccbrdf.icc.xml.node import Node
+from iccbrdf.icc.xml.values import Codec
 
 MAX_TOKENS = 1 << 20
 """Words of a main function once its macros are expanded: small files could stand for endless ones."""
@@ -33,6 +34,9 @@ _VARIABLE = re.compile(
     rf"(?P<name>@?{_NAME}(?:\.{_NAME})?)(?:[\[(](?P<first>\d{{1,5}})(?:,(?P<count>\d{{1,5}}))?[\])])?"
 )
 _SIZED = re.compile(rf"({_NAME})(?:[\[(](\d{{1,5}})[\])])?")
+
+_BARE = re.compile(r"(?<![^\s{}])(in|out|tget|tput|tsav)(?=\s*\}|\s+[^\s(\[{]|\s*$)")
+"""What has no argument, which then is 0."""
 
 _MEMORY = ("tget", "tput", "tsav")
 _APPLY = tuple(name for name, row in OPERATORS.items() if row.operand is Operand.ELEMENT)
@@ -58,8 +62,7 @@ class Span:
         return f"{self.first} to {self.first + self.size - 1}"
 
 
-def sized_names(text: str) -> dict[str, Span]:
-    """`a b[2] c` as spans one after the other; ValueError for anything else."""
+def _sized_names(text: str) -> dict[str, Span]:
     spans: dict[str, Span] = {}
     first = 0
     for word in text.split():
@@ -71,6 +74,10 @@ def sized_names(text: str) -> dict[str, Span]:
         spans[match[1]] = Span(first, int(match[2] or 1))
         first += spans[match[1]].size
     return spans
+
+
+SIZED_NAMES = Codec(_sized_names, " ".join)
+"""`a b[2] c` as spans one after the other."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +166,7 @@ class _Expansion:
             for p in pieces
         )
         # As many line ends as there are lines before it in the file, so that errors name the file's lines.
-        return "\n" * (main.line - 1) + "".join(words)
+        return "\n" * (main.line - 1) + _BARE.sub(r"\1(0)", "".join(words))
 
     def _pieces(self, text: str, place: _Place, calls: tuple[str, ...]) -> Iterator[str | _Local]:
         for token in _TOKEN.finditer(text):
@@ -220,11 +227,14 @@ class _Expansion:
         return f"{operator}({first},{size})" if size > 1 else f"{operator}({first})"
 
     def _memory(self, operator: str, name: str, place: _Place) -> str | _Local:
-        match = _VARIABLE.fullmatch(name)
-        if match is None:
+        match = _VARIABLE.match(name)
+        rest = name[match.end() :] if match else name
+        if match is None or rest.strip("[]()"):
             raise place.error(
                 f"found {operator}{{{name:.40}}}, expected name, name[index] or name[first,count]"
             )
+        if rest:
+            place.node.document.warn(place.error(f"{rest!r} after {operator}{{{match[0]} is ignored"))
         whole = match["name"]
         local = whole.startswith("@")
         if local and place.macro is None:

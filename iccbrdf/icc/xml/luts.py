@@ -27,7 +27,7 @@ from iccbrdf.icc.xml.forms import (
     write_numbers,
 )
 from iccbrdf.icc.xml.node import Node, Target
-from iccbrdf.icc.xml.values import FIXED16, U16
+from iccbrdf.icc.xml.values import FIXED16, U16, U32
 
 CURVE_FORMS = Forms("curve")
 
@@ -51,18 +51,15 @@ class _Entries(Part):
 def curve_entries(node: Node, greatest: int) -> list[int]:
     """The integers of a curve, up to `greatest`."""
     size = node.attributes.get("IdentitySize")
-    try:
-        values = read_numbers(node, np.uint32, 0).tolist()
-        if size is not None and not values:
-            count = int(size) if size.isdecimal() and len(size) < 8 else 0
-            if not 2 <= count <= _MAX_IDENTITY:
-                raise ValueError(f"IdentitySize: found {size!r:.20}, expected 2 to {_MAX_IDENTITY}")
-            values = np.rint(np.linspace(0, greatest, count)).astype(int).tolist()
-        if values and max(values) > greatest:
-            raise ValueError(f"found {max(values)}, expected up to {greatest}")
-    except ValueError as error:
-        raise node.error(str(error)) from None
-    return list(values)
+    values: list[int] = read_numbers(node, np.uint32, 0).tolist()
+    if size is not None and not values:
+        count = node.value(U32, size, "IdentitySize")
+        if not 2 <= count <= _MAX_IDENTITY:
+            raise node.error(f"IdentitySize: found {count}, expected 2 to {_MAX_IDENTITY}")
+        values = np.rint(np.linspace(0, greatest, count)).astype(int).tolist()
+    if values and max(values) > greatest:
+        raise node.error(f"found {max(values)}, expected up to {greatest}")
+    return values
 
 
 CURVE_FORMS.add(
@@ -95,14 +92,9 @@ class _Elements(Part):
         self.attributes = tuple(f"e{i + 1}" for i in range(count))
 
     def read(self, node: Node, seen: Seen) -> None:
-        values = []
-        for index, name in enumerate(self.attributes):
-            try:
-                text = node.attributes.get(name, "0") if index >= 9 else node.get(name)
-                values.append(FIXED16.read(text))
-            except ValueError as error:
-                raise node.error(f"{name}: {error}") from None
-        seen["matrix"] = tuple(values)
+        texts = {name: node.get(name) for name in self.attributes[:9]}
+        texts |= {name: node.attributes.get(name, "0") for name in self.attributes[9:]}
+        seen["matrix"] = tuple(node.value(FIXED16, text, name) for name, text in texts.items())
 
     def write(self, out: Target, record: Any) -> None:
         for name, value in zip(self.attributes, record.matrix, strict=True):
@@ -113,10 +105,7 @@ def _read_table(node: Node, seen: Seen, encoding: int) -> Any:
     """The values of a table, which stand for 0..1 as the value encoding says."""
     greatest = ENCODINGS[encoding][1]
     shape = (*seen["grid"], seen["outputs"])
-    try:
-        values = read_numbers(node, np.uint32, 0)
-    except ValueError as error:
-        raise node.error(str(error)) from None
+    values = read_numbers(node, np.uint32, 0)
     expected = int(np.prod(shape, dtype=object))
     if values.size != expected:
         raise node.error(f"found {values.size} numbers, expected {expected} ({' x '.join(map(str, shape))})")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,13 +14,16 @@ from iccbrdf.errors import (
     InputError,
     LimitError,
     ProfileError,
+    ProfileWarning,
     UnsupportedError,
     nearest,
 )
 from iccbrdf.icc.source_tag import CalculatorSource
+from iccbrdf.icc.xml.values import Codec, Odd
 
 MAX_BYTES = 128 << 20
 """Of an XML file together with all files that it names, and of the XML that is written."""
+MAX_WARNINGS = 20
 MAX_TEXT = 10_000_000
 """Bytes in one piece of text: what libxml2 reads unless it is told to give up its limits."""
 
@@ -27,15 +31,27 @@ _LIMIT_WORDS = ("huge", "excessive depth", "amplification", "entity reference lo
 """How libxml2 says that a file is beyond its limits."""
 
 
-class Files:
-    """The files of one document: nothing outside `folder` is read, and no more than `MAX_BYTES` in all.
+class Document:
+    """What holds for one document that is read, and for the files that it names.
 
-    `folder` None: the document may name no file.
+    folder: nothing outside it is read; None: the document may name no file.  strict: refuse what else is
+    ignored with a warning.
     """
 
-    def __init__(self, folder: Path | None) -> None:
+    def __init__(self, folder: Path | None, *, strict: bool = False) -> None:
         self.folder = folder
+        self.strict = strict
         self._left = MAX_BYTES
+        self._warnings = 0
+
+    def warn(self, error: IccBrdfError) -> None:
+        """Warn of something that hinders nothing, or raise it as an error."""
+        if self.strict:
+            raise error
+        self._warnings += 1
+        if self._warnings <= MAX_WARNINGS:
+            more = "; further warnings are not shown" if self._warnings == MAX_WARNINGS else ""
+            warnings.warn(f"{error}{more}", ProfileWarning, stacklevel=2)
 
     def read(self, path: Path) -> bytes:
         """All bytes of a file; InputError where it cannot be read, LimitError where it is too large."""
@@ -67,7 +83,7 @@ class Files:
             raise node.error(str(error), kind=InputError) from None
 
 
-def parse(data: bytes, source: str, files: Files) -> Node:
+def parse(data: bytes, source: str, document: Document) -> Node:
     """The root element of a document.
 
     Raises InputError where it is no well-formed XML, ProfileError where it declares a document type, and
@@ -94,17 +110,17 @@ def parse(data: bytes, source: str, files: Files) -> Node:
         raise InputError(f"{source}: {error}; expected an XML file") from None
     if root.getroottree().docinfo.doctype:
         raise ProfileError(f"{source}: found a document type declaration (DOCTYPE), expected none")
-    return Node(root, source, files)
+    return Node(root, source, document)
 
 
 class Node:
     """An element that is read."""
 
     def __init__(
-        self, element: Any, source: str, files: Files, *, records: int = 0, hidden: tuple[str, ...] = ()
+        self, element: Any, source: str, document: Document, *, records: int = 0, hidden: tuple[str, ...] = ()
     ) -> None:
         self.source = source
-        self.files = files
+        self.document = document
         self.records = records
         """How many records this one stands in."""
         self._element = element
@@ -131,17 +147,32 @@ class Node:
         """The elements in it."""
         for child in self._element:
             if child.tag not in self._hidden:
-                yield Node(child, self.source, self.files, records=self.records)
+                yield Node(child, self.source, self.document, records=self.records)
 
     def hiding(self, *names: str) -> Node:
         """The same element without the elements of these names in it."""
-        return Node(self._element, self.source, self.files, records=self.records, hidden=names)
+        return Node(self._element, self.source, self.document, records=self.records, hidden=names)
 
     def error(
         self, message: str, *, line: int | None = None, kind: type[IccBrdfError] = ProfileError
     ) -> IccBrdfError:
         """The error about what stands here."""
         return kind(f"{self.source}:{self.line if line is None else line}: <{self.name}>: {message}")
+
+    def warn(self, message: str) -> None:
+        """Warn about what stands here."""
+        self.document.warn(self.error(message))
+
+    def value(self, codec: Codec, text: str, what: str = "") -> Any:
+        """What `text`, which stands here, says; `what` names it in messages."""
+        label = f"{what}: " if what else ""
+        try:
+            return codec.read(text)
+        except Odd as odd:
+            self.warn(f"{label}{odd}")
+            return odd.value
+        except ValueError as error:
+            raise self.error(f"{label}{error}") from None
 
     def get(self, name: str) -> str:
         """An attribute that must be there."""
@@ -154,18 +185,18 @@ class Node:
         """The one element in it of any of these names; None where there is none."""
         found = [child for child in self if child.name in names]
         if len(found) > 1:
-            raise found[1].error(f"found a second one in <{self.name}>, expected one")
+            found[1].warn(f"a second one in <{self.name}> is ignored")
         return found[0] if found else None
 
     def expect(self, attributes: tuple[str, ...], children: tuple[str, ...] | None) -> None:
-        """Refuse attributes and, unless None, elements of other names than these."""
+        """Warn of attributes and, unless None, elements of other names than these, as they are ignored."""
         for name in self.attributes:
             if name not in attributes:
-                raise self.error(f"no attribute {name!r}: {nearest(name, attributes)}")
+                self.warn(f"attribute {name!r} is ignored: {nearest(name, attributes)}")
         if children is not None:
             for child in self:
                 if child.name not in children:
-                    raise child.error(f"not known in <{self.name}>: {nearest(child.name, children)}")
+                    child.warn(f"ignored in <{self.name}>: {nearest(child.name, children)}")
 
 
 class Job:

@@ -76,14 +76,16 @@ class _Text(Part):
 
     def _piece(self, node: Node) -> str:
         node.expect(self._attributes, ())
+        if node.name == "HexTextData":
+            data = node.value(HEX_LINES, node.text)
+        elif "File" in node.attributes:
+            _, data = node.document.named(node, node.get("File"))
+        else:
+            return node.text
         try:
-            if node.name == "HexTextData":
-                return bytes(HEX_LINES.read(node.text)).decode("utf-8")
-            if "File" in node.attributes:
-                return node.files.named(node, node.get("File"))[1].decode("utf-8")
-        except ValueError as error:
-            raise node.error(str(error)) from None
-        return node.text
+            return str(data, "utf-8")
+        except UnicodeDecodeError as error:
+            raise node.error(f"found bytes that are no UTF-8 ({error.reason})") from None
 
     def write(self, out: Target, record: Any) -> None:
         out.child("TextData").write(record.text)
@@ -101,10 +103,7 @@ class _Compressed(_Text):
             super().read(node, text)
             seen["data"] = CompressedUtf8.of(text["text"]).data
             return
-        try:
-            seen["data"] = HEX_LINES.read(packed.text)
-        except ValueError as error:
-            raise packed.error(str(error)) from None
+        seen["data"] = packed.value(HEX_LINES, packed.text)
 
     def write(self, out: Target, record: Any) -> None:
         out.child("HexCompressedData").write(HEX_LINES.write(record.data))
@@ -116,14 +115,18 @@ class _Language(Part):
     attributes = ("LanguageCountry",)
 
     def read(self, node: Node, seen: Seen) -> None:
-        try:
-            code = signature_bytes(node.get(self.attributes[0])).decode("latin-1")
-        except ValueError as error:
-            raise node.error(f"{self.attributes[0]}: {error}") from None
+        name = self.attributes[0]
+        code = node.value(_CODE, node.get(name), name)
         seen["language"], seen["country"] = code[:2], code[2:]
 
     def write(self, out: Target, record: LocalisedText) -> None:
-        out.set(self.attributes[0], signature_text(f"{record.language}{record.country}".encode("latin-1")))
+        out.set(self.attributes[0], _CODE.write(record.language + record.country))
+
+
+_CODE = Codec(
+    lambda text: signature_bytes(text).decode("latin-1"),
+    lambda code: signature_text(code.encode("latin-1")),
+)
 
 
 TEXT = Codec(str, str)
@@ -254,6 +257,11 @@ _ILLUMINANT = choice(
 )
 
 
+_TEMPERATURE = Codec(
+    lambda text: 0.0 if text.strip() in ("", "Unknown") else FLOAT32.read(text), FLOAT32.write
+)
+
+
 def _spectral(name: str, prefix: str, field: str, rows: int) -> Inside:
     """Numbers with their wavelengths; left out where there are none."""
     span, steps = f"{prefix}_range", f"{prefix}_steps"
@@ -317,7 +325,7 @@ TYPE_FORMS.add(
         Inside("IlluminantXYZ", Triple("illuminant_XYZ", FLOAT32)),
         _spectral("ObserverFuncs", "observer", "observer_table", 3),
         Inside("StdIlluminant", Content("illuminant", _ILLUMINANT)),
-        Inside("ColorTemperature", Content("cct", FLOAT32)),
+        Inside("ColorTemperature", Content("cct", _TEMPERATURE), default=lambda seen: {"cct": 0.0}),
         _spectral("IlluminantSPD", "illuminant", "spd", 1),
         Inside("SurroundXYZ", Triple("surround_XYZ", FLOAT32)),
     ),
@@ -356,11 +364,8 @@ class _Vertices(Part):
 
     @staticmethod
     def _values(node: Node) -> Any:
-        try:
-            channels = U16.read(node.get("channels"))
-            values = read_numbers(node, np.float32, 0)
-        except ValueError as error:
-            raise node.error(str(error)) from None
+        channels = node.value(U16, node.get("channels"), "channels")
+        values = read_numbers(node, np.float32, 0)
         if not channels or values.size % channels:
             raise node.error(f"found {values.size} numbers, expected a multiple of {channels} channels")
         return values.reshape(-1, channels)
@@ -383,10 +388,7 @@ class _Triangles(Part):
     def read(self, node: Node, seen: Seen) -> None:
         rows = []
         for child in node.child("Triangles") or ():
-            try:
-                rows.append(read_numbers(child, np.uint32, 0))
-            except ValueError as error:
-                raise child.error(str(error)) from None
+            rows.append(read_numbers(child, np.uint32, 0))
             if child.name != "T" or rows[-1].size != 3:
                 raise child.error(f"found {rows[-1].size} numbers, expected three in <T>")
         seen["triangles"] = np.array(rows, np.uint32).reshape(-1, 3)
@@ -405,7 +407,7 @@ class _File(Part):
     def read(self, node: Node, seen: Seen) -> None:
         name = node.attributes.get("File") or node.attributes.get("Filename")
         if name:
-            seen["image"] = node.files.named(node, name)[1]
+            seen["image"] = node.document.named(node, name)[1]
         else:
             Content("image", HEX_LINES).read(node, seen)
 

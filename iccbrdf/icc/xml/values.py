@@ -20,6 +20,14 @@ _INFINITY = "1e999"
 """A number that every reader takes for infinity; the ICC's tools take the letters `inf` for 0."""
 
 
+class Odd(ValueError):
+    """Text that is no value as it should be written, but that the ICC's tools take for `value`."""
+
+    def __init__(self, message: str, value: Any) -> None:
+        super().__init__(message)
+        self.value = value
+
+
 @dataclass(frozen=True)
 class Codec:
     """A value as text: `read` raises ValueError with what was found and expected."""
@@ -58,37 +66,41 @@ def decimals(values: Numbers) -> list[str]:
     return texts
 
 
-def parse_numbers(text: str, dtype: npt.DTypeLike) -> Numbers:
-    """The numbers in `text`, between blanks or commas, as unsigned integers of `dtype` or as float64."""
+def numbers(dtype: npt.DTypeLike) -> Codec:
+    """Numbers between blanks or commas, read as unsigned integers of `dtype` or as float64."""
     kind = np.dtype(dtype)
-    tokens = text.replace(",", " ").split()
-    for token in tokens:
-        if not _NUMBER.fullmatch(token):
-            raise ValueError(f"found {token!r:.40}, expected a number")
-    if kind.kind != "u":
-        return np.array([float(token) for token in tokens], np.float64)
-    whole = [_integer(token) for token in tokens]
-    limit = 256**kind.itemsize
-    for number in whole:
-        if not 0 <= number < limit:
-            raise ValueError(f"found {number}, expected 0 to {limit - 1}")
-    return np.array(whole, kind)
+
+    def read(text: str) -> Numbers:
+        tokens = text.replace(",", " ").split()
+        found = [_NUMBER.match(token) for token in tokens]
+        odd = next((t for t, n in zip(tokens, found, strict=True) if n is None or n[0] != t), None)
+        texts = [n[0] for n in found if n is not None]
+        if len(texts) < len(tokens):
+            raise ValueError(f"found {odd!r:.40}, expected a number")
+        values = np.array([_integer(t, kind) for t in texts], kind) if kind.kind == "u" else np.array(
+            [float(t) for t in texts], np.float64
+        )  # fmt: skip
+        if odd is not None:
+            raise Odd(f"found {odd!r:.40}, read as far as it is a number", values)
+        return values
+
+    return Codec(read, lambda values: " ".join(decimals(np.asarray(values))))
 
 
-def _integer(token: str) -> int:
-    try:
-        return int(token)
-    except ValueError:
-        number = float(token)
-    if not number.is_integer():
-        raise ValueError(f"found {token}, expected an integer") from None
+def _integer(token: str, kind: np.dtype[Any]) -> int:
+    number = int(token) if token.isdecimal() and len(token) <= 20 else float(token)
+    if not (number == number // 1 and 0 <= number < 256**kind.itemsize):
+        raise ValueError(f"found {token:.40}, expected an integer from 0 to {256**kind.itemsize - 1}")
     return int(number)
 
 
 def _float(text: str) -> float:
     text = text.strip()
-    if not _NUMBER.fullmatch(text):
+    match = _NUMBER.match(text)
+    if match is None:
         raise ValueError(f"found {text!r:.40}, expected a number")
+    if match[0] != text:
+        raise Odd(f"found {text!r:.40}, read as {match[0]}", float(match[0]))
     return float(text)
 
 
