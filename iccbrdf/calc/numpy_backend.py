@@ -34,15 +34,11 @@ def compile_numpy(plan: Schedule) -> NumpyKernel:
     return NumpyKernel(plan, lower(plan))
 
 
-# Running -----------------------------------------------------------------------------------------------
-
-
 class NumpyKernel:
     """A compiled schedule.  It may be run by several threads at once: each run has buffers of its own."""
 
     def __init__(self, plan: Schedule, steps: Steps) -> None:
         self._dtype = np.dtype(plan.graph.dtype)
-        self._channels, self._outputs = plan.channels, len(plan.graph.outputs)
         self._layout = _Layout(plan, allocate(steps))
         self._code = _bound(steps, self._layout)
         self.tile = min(TILE, max(1, MAX_VALUES // max(1, self.registers)))
@@ -71,9 +67,9 @@ class NumpyKernel:
             planes = self._idle.pop()
         except IndexError:
             planes = _Planes(self._layout, self._dtype, self.tile)
-        uniform = self._layout.uniform(arguments, self._dtype)
         size = -1
         with np.errstate(all="ignore"):
+            uniform = self._layout.uniform(arguments, self._dtype)
             for start in range(0, len(pixels), self.tile):
                 part = slice(start, start + self.tile)
                 ins, outs = pixels[part].T, out[part].T

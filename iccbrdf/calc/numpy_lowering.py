@@ -121,6 +121,7 @@ class _Lowering:
         self.code.steps.append(Step(function, reads, tuple(places)))
         for component, place in enumerate(places):
             self._known[node, component] = place
+        # A curve is read itself, the others through picks.
         self._known[node, View.NUMBER] = places[0]
 
     # Branches
