@@ -152,10 +152,14 @@ class Assembler:
     target: Target
     real: str
     """The working type of the program, float or double."""
+    inline: bool = True
+    """Whether functions are written out where they are used, and not called."""
     lines: list[str] = field(default_factory=list)
     block: str = "entry"
     needed: dict[str, str] = field(default_factory=dict)
     """Declarations and functions beside this one, by name."""
+    buffers: list[str] = field(default_factory=list)
+    """Instructions that make room on the stack, for the start of the function."""
     _count: int = 0
 
     def fresh(self, stem: str = "") -> str:
@@ -269,6 +273,19 @@ class Assembler:
         where = self.address(base, value.type.element, offset)
         self.do(f"store {value.type} {value.name}, ptr {where}, align {value.type.size}")
 
+    def buffer(self, element: str, count: int) -> str:
+        """Room for so many numbers."""
+        name = self.fresh("%buffer")
+        self.buffers.append(f"  {name} = alloca [{count} x {element}], align 64")
+        return name
+
+    def load_broadcast(self, base: str, type: Type, offset: int | str) -> Value:
+        """One number from memory in all lanes."""
+        where = self.address(base, type.element, offset)
+        number = self.scalar(f"load {type.element}, ptr {where}, align {type.size}")
+        first = self.append(type, f"insertelement {type} poison, {type.element} {number}, i64 0")
+        return self.shuffle(first, None, [0] * type.lanes)
+
     def gather(self, base: str, index: Value, type: Type) -> Value:
         """The elements at i32 indices, which are not negative and lie inside."""
         pointers = type.of("ptr")
@@ -282,10 +299,6 @@ class Assembler:
         return self.append(
             type, f"call {type} {name}({pointers} {where.name}, i32 {type.size}, {every}, {type} poison)"
         )
-
-    def broadcast(self, scalar: str, type: Type) -> Value:
-        first = self.append(type, f"insertelement {type} poison, {type.element} {scalar}, i64 0")
-        return self.shuffle(first, None, [0] * type.lanes)
 
     # Control -------------------------------------------------------------------------------------------
 
@@ -306,6 +319,43 @@ class Assembler:
             self.append(value.type, f"phi {value.type} [ {value.name}, %{end} ], [ poison, %{before} ]")
             for value in values
         ]
+
+    def loop(self, count: int, write: Callable[[str], None]) -> None:
+        """What `write` writes, for each number from 0 to `count` - 1 in turn; it is given its name."""
+        start, end = self.fresh("repeat"), self.fresh("done")
+        number, following, before = self.fresh("%n"), self.fresh("%n"), self.block
+        self.do(f"br label %{start}")
+        self.label(start)
+        place = len(self.lines)
+        write(number)
+        self.lines.insert(place, f"  {number} = phi i64 [ 0, %{before} ], [ {following}, %{self.block} ]")
+        self.do(f"{following} = add nuw nsw i64 {number}, 1")
+        more = self.scalar(f"icmp ult i64 {following}, {count}")
+        self.do(f"br i1 {more}, label %{start}, label %{end}")
+        self.label(end)
+
+    def apply(self, name: str, write: Callable[..., Value], *values: Value) -> Value:
+        """What `write` makes of values of one type: in place, or in a function that is called."""
+        if self.inline:
+            return write(*values)
+        type = values[0].type
+        full = f"@{name}.{type.suffix}"
+        if full not in self.needed:
+            inner = Assembler(self.target, self.real, True, needed=self.needed)
+            parameters = [Value(inner, type, f"%a{i}") for i in range(len(values))]
+            result = write(*parameters)
+            head = ", ".join(f"{type} {value.name}" for value in parameters)
+            self.needed[full] = "\n".join(
+                [
+                    f"define internal fastcc {type} {full}({head}) noinline {{",
+                    "entry:",
+                    *inner.lines,
+                    f"  ret {type} {result.name}",
+                    "}",
+                ]
+            )
+        arguments = ", ".join(f"{type} {value.name}" for value in values)
+        return self.append(type, f"call fastcc {type} {full}({arguments})")
 
     def each_lane(self, function: str, *values: Value) -> Value:
         """A function of the C library, called with float64 numbers lane by lane."""

@@ -24,6 +24,9 @@ from iccbrdf.errors import UnsupportedError
 
 ENTRY = "kernel"
 """The function: (pixels, out, number of blocks, arguments, tables)."""
+MOST_INLINE = 64
+"""Elementary functions up to which each is written out where it is used.  Beyond, calls make a tenth more
+run time and a third of the time to compile, which then matters more."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,8 @@ class _Body:
         self.schedule = schedule
         single = schedule.graph.dtype is np.float32
         self.type = Type("float", target.lanes) if single else Type("double", max(4, target.lanes // 2))
-        self.code = Assembler(target, self.type.element, block="loop")
+        called = sum(node.op in _SINGLE for node in computed(schedule.body)) > MOST_INLINE
+        self.code = Assembler(target, self.type.element, inline=not called, block="loop")
         self.tables = lookup.Tables(self.code)
         self.values: dict[Node, Value] = {}
         self.several: dict[Node, list[Value]] = {}
@@ -75,6 +79,7 @@ class _Body:
             f"define void @{ENTRY}(ptr noalias readonly %pixels, ptr noalias writeonly %out, i64 %blocks, "
             "ptr noalias readonly %arguments, ptr noalias readonly %tables) {",
             "entry:",
+            *code.buffers,
             *self.tables.prologue(),
             "  br label %loop",
             "loop:",
@@ -98,9 +103,7 @@ class _Body:
     def _arguments(self) -> None:
         code = self.code
         for position, node in enumerate(self.schedule.arguments):
-            where = code.address("%arguments", self.type.element, position)
-            number = code.scalar(f"load {self.type.element}, ptr {where}, align {self.type.size}")
-            value = code.broadcast(number, self.type)
+            value = code.load_broadcast("%arguments", self.type, position)
             self.values[node] = value.differs(0.0) if is_truth(node) else value
 
     def _block(self, block: Block) -> None:
@@ -141,15 +144,19 @@ class _Body:
         elif node.op == "curve":
             self.values[node] = lookup.curve(self.tables, node.detail, self.number(node.arguments[0]))
         elif node.op == "pow" and self.type.element == "float" and node.arguments[1].op == "const":
-            self.values[node] = wide.power(self.number(node.arguments[0]), node.arguments[1].detail[0])
+            self.values[node] = wide.known_power(self.number(node.arguments[0]), node.arguments[1].detail[0])
         elif node.op in _LOGIC:
             self.values[node] = _LOGIC[node.op](*map(self.truth, node.arguments))
         else:
-            special = _SINGLE if self.type.element == "float" else _DOUBLE
-            function = _OPERATORS.get(node.op) or special.get(node.op)
-            if function is None:
-                raise UnsupportedError(f"{node.op} cannot be run by LLVM ({node})")
-            self.values[node] = function(*self._numbers(node))
+            self.values[node] = self._function(node.op, self._numbers(node))
+
+    def _function(self, op: str, values: Sequence[Value]) -> Value:
+        if op in _OPERATORS:
+            return _OPERATORS[op](*values)
+        special = _SINGLE if self.type.element == "float" else _DOUBLE
+        if op not in special:
+            raise UnsupportedError(f"{op} nodes cannot be run by LLVM")
+        return self.code.apply(op, special[op], *values)
 
     def _numbers(self, node: Node) -> list[Value]:
         return [self.number(argument) for argument in node.arguments]

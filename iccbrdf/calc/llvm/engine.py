@@ -14,8 +14,6 @@ from iccbrdf.calc.llvm.target import Target, binding
 
 PROGRAMS_KEPT = 32
 """Compiled programs in memory; the least recently used one goes first."""
-LARGE = 1_500_000
-"""Characters of assembly from which compiling is told to take less care."""
 
 _SIGNATURE = ctypes.CFUNCTYPE(
     None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p
@@ -31,9 +29,8 @@ class Compiled:
 
     def __init__(self, text: str, target: Target) -> None:
         llvm = _initialised()
-        level = 1 if len(text) > LARGE else 3
         machine = llvm.Target.from_default_triple().create_target_machine(
-            cpu=target.cpu, features=target.features, opt=level
+            cpu=target.cpu, features=target.features, opt=2
         )
         module = llvm.parse_assembly(text)
         module.triple = machine.triple

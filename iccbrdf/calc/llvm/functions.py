@@ -15,8 +15,13 @@ _LOG2_E = 1 / math.log(2)
 # Few enough bits that multiples are exact.
 _LN2_HIGH = 0.693359375
 _LN2_LOW = math.log(2) - _LN2_HIGH
+# pi / 2 in parts of 24 bits, and of 33 and 53.  All are positive: then -0 stays -0.
+_HALF_PI = tuple(map(float.fromhex, ("0x1.921fb4p+0", "0x1.4442d0p-24", "0x1.846988p-48")))
 _HALF_PI_HIGH = float.fromhex("0x1.921fb544p+0")
 _HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")
+
+_EXP_LARGEST = float.fromhex("0x1.62e42ep6")
+"""The largest float32 number whose exponential is one."""
 
 # (e^r - 1 - r) / r^2 for |r| <= ln 2 / 2
 _EXP = (0.49999994, 0.16666517, 0.041668102, 0.0083691655, 0.0013838324)
@@ -44,17 +49,31 @@ def nearest(x: Value, shift: float) -> tuple[Value, Value]:
 def exp(x: Value) -> Value:
     """e^x."""
     code = x.code
-    x = code.select(x > 89.0, 89.0, x)
-    x = code.select(x < -104.0, -104.0, x)
-    whole, n = nearest(x * _LOG2_E, 1.5 * 2**23)
-    r = code.muladd(whole, -_LN2_HIGH, x)
+    within = code.select(x < -104.0, -104.0, x)
+    whole, n = nearest(within * _LOG2_E, 1.5 * 2**23)
+    r = code.muladd(whole, -_LN2_HIGH, within)
     r = code.muladd(whole, -_LN2_LOW, r)
-    result = code.muladd(r * r, code.polynomial(r, _EXP), r) + 1.0
-    # In two steps: 2^n alone may be too large or too small for a number.
-    half = n >> 1
-    for part in (half, n - half):
-        result = result * code.from_bits((part + 127) << 23, x)
-    return result
+    power = code.muladd(r * r, code.polynomial(r, _EXP), r) + 1.0
+    return code.select(x <= _EXP_LARGEST, scaled(power, n), x + math.inf)
+
+
+def scaled(x: Value, n: Value) -> Value:
+    """2^n x for x near 1, n from -1000 up to what a float32 number holds; NaN may give anything.
+
+    Processors take a hundred times as long to multiply where the product is subnormal: normal products are
+    made by an addition to the exponent, others in float64.
+    """
+    code = x.code
+    normal = code.from_bits(code.bits(x) + (n << 23), x)
+    small = n < -125
+
+    def subnormal() -> list[Value]:
+        factor = code.cast("sext", n + 1023, n.type.of("i64")) << 52
+        wide = code.widen(x)
+        return [code.narrow(wide * code.from_bits(factor, wide), x.type)]
+
+    (other,) = code.where_any(small, subnormal)
+    return code.select(small, other, normal)
 
 
 def cbrt(x: Value) -> Value:
@@ -80,21 +99,34 @@ def cbrt(x: Value) -> Value:
 
 # Angles ------------------------------------------------------------------------------------------------
 
-_MOST_TURNED = 2.0**20
-"""Up to this size an argument's multiple of pi / 2 is exact in float64."""
+_TINY = 2.0**-30
+_MOST_TURNED = 2.0**13
+"""Up to this size of an argument the number of quarter turns is right, and their sum exact enough."""
+
+
+def _turned_back(x: Value) -> tuple[Value, Value]:
+    """x less n quarter turns, of size up to pi / 4, and n as i32."""
+    code = x.code
+    whole, turns = nearest(x * (2 / math.pi), 1.5 * 2**23)
+    if code.target.fma:
+        for part in _HALF_PI:
+            x = code.muladd(whole, -part, x)
+        return x, turns
+    number = code.widen(whole)
+    rest = code.widen(x) - number * _HALF_PI_HIGH - number * _HALF_PI_LOW
+    return code.narrow(rest, x.type), turns
 
 
 def _quarter(x: Value) -> tuple[Value, Value, Value]:
-    """Sine and cosine of x less n quarter turns, |rest| <= pi / 4, and n as i32."""
+    """Sine and cosine of x less n quarter turns, and n as i32."""
     code = x.code
-    wide = code.widen(x)
-    whole, turns = nearest(wide * (2 / math.pi), 1.5 * 2**52)
-    r = code.narrow(wide - whole * _HALF_PI_HIGH - whole * _HALF_PI_LOW, x.type)
+    # Nor does a subnormal argument do harm when it is 0.
+    r, turns = _turned_back(code.select(abs(x) < _TINY, 0.0, x))
     z = r * r
     # r (1 + ...) keeps the sign of a zero.
     sine = r * code.muladd(z, code.polynomial(z, _SIN), 1.0)
     cosine = code.muladd(z * z, code.polynomial(z, _COS), code.muladd(z, -0.5, 1.0))
-    return sine, cosine, code.cast("trunc", turns, x.type.of("i32"))
+    return sine, cosine, turns
 
 
 def _unless_large(x: Value, result: Value, function: str) -> Value:
@@ -106,6 +138,11 @@ def _unless_large(x: Value, result: Value, function: str) -> Value:
     return code.select(large, other, result)
 
 
+def _unless_tiny(x: Value, result: Value) -> Value:
+    """`result`, or x where it is so small that it is its own sine and tangent."""
+    return x.code.select(abs(x) < _TINY, x, result)
+
+
 def _with_sign(x: Value, turns: Value) -> Value:
     """-x where bit 1 of `turns` is set."""
     code = x.code
@@ -115,7 +152,7 @@ def _with_sign(x: Value, turns: Value) -> Value:
 def sin(x: Value) -> Value:
     sine, cosine, turns = _quarter(x)
     chosen = x.code.select((turns & 1).differs(0), cosine, sine)
-    return _unless_large(x, _with_sign(chosen, turns), "sin")
+    return _unless_tiny(x, _unless_large(x, _with_sign(chosen, turns), "sin"))
 
 
 def cos(x: Value) -> Value:
@@ -129,7 +166,7 @@ def tan(x: Value) -> Value:
     sine, cosine, turns = _quarter(x)
     odd = (turns & 1).differs(0)
     result = code.select(odd, -cosine, sine) / code.select(odd, sine, cosine)
-    return _unless_large(x, result, "tan")
+    return _unless_tiny(x, _unless_large(x, result, "tan"))
 
 
 def angle(x: Value, y: Value) -> Value:

@@ -15,12 +15,13 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 
 from iccbrdf.calc.elements import Piece, formula, piece_nodes, pieces
-from iccbrdf.calc.llvm.assembler import Assembler, Value
+from iccbrdf.calc.llvm.assembler import Assembler, Type, Value
+from iccbrdf.calc.llvm.rows import load_channels
 from iccbrdf.calc.llvm.wide import wide_exp, wide_log, wide_log10, wide_power
 from iccbrdf.errors import UnsupportedError
 
-MOST_GATHERED = 4096
-"""Numbers read for one pixel of a look-up table: 2^inputs corners of a cell times the outputs."""
+MOST_INPUTS, MOST_OUTPUTS = 8, 64
+"""Of a look-up table: the code grows with 2^inputs outputs."""
 
 
 class Tables:
@@ -55,41 +56,64 @@ class Tables:
 
 
 def look_up(tables: Tables, element: Any, channels: Sequence[Value]) -> list[Value]:
-    """The outputs of a CLUT, summed over the corners of a cell in the interpreter's order."""
+    """The outputs of a CLUT, summed over the corners of a cell in the interpreter's order.
+
+    Pixel by pixel, with a node's outputs as a vector: they lie side by side in the table.
+    """
     code, type = channels[0].code, channels[0].type
     *grid, outputs = element.table.shape
-    if 2 ** len(grid) * outputs > MOST_GATHERED:
+    if len(grid) > MOST_INPUTS or outputs > MOST_OUTPUTS:
         raise UnsupportedError(
-            f"clut of {len(grid)} inputs and {outputs} outputs: it reads {2 ** len(grid) * outputs} "
-            f"numbers for a pixel, at most {MOST_GATHERED} with LLVM"
+            f"clut of {len(grid)} inputs and {outputs} outputs, at most {MOST_INPUTS} and {MOST_OUTPUTS} "
+            "with LLVM"
         )
     dtype = np.float32 if type.element == "float" else np.float64
     base = tables.base(element.table.astype(dtype))
-    stride = element.table.size
-    index = code.constant(0, type.of("i32"))
-    axes = []
-    for x, count in zip(channels, grid, strict=True):
+    cells, offsets, weights = _cells(element.table.shape, channels)
+    lanes = type.lanes
+    cell_buffer = code.buffer("i32", lanes)
+    weight_buffer = code.buffer(type.element, lanes * len(weights))
+    result_buffer = code.buffer(type.element, lanes * outputs)
+    code.store(cells, cell_buffer, 0)
+    for number, weight in enumerate(weights):
+        code.store(weight, weight_buffer, number * lanes)
+    row = Type(type.element, outputs)
+
+    def pixel(lane: str) -> None:
+        cell = code.scalar(f"load i32, ptr {code.address(cell_buffer, 'i32', lane)}, align 4")
+        wide = code.scalar(f"zext i32 {cell} to i64")
+        corner = code.address(base, type.element, wide)
+        weight_here = code.address(weight_buffer, type.element, lane)
+        total = code.constant(0.0, row)
+        for number, offset in enumerate(offsets):
+            weight = code.load_broadcast(weight_here, row, number * lanes)
+            total = total + weight * code.load(corner, row, offset)
+        start = code.scalar(f"mul nuw nsw i64 {lane}, {outputs}")
+        code.store(total, result_buffer, start)
+
+    code.loop(lanes, pixel)
+    results = load_channels(code, result_buffer, type, outputs, range(outputs))
+    return [results[output] for output in range(outputs)]
+
+
+def _cells(shape: Sequence[int], channels: Sequence[Value]) -> tuple[Value, list[int], list[Value]]:
+    """Where each pixel's cell begins in the table, and offsets and weights of the cell's corners."""
+    code = channels[0].code
+    stride = int(np.prod(shape))
+    cells = code.constant(0, channels[0].type.of("i32"))
+    offsets: list[int] = [0]
+    weights: list[Value] = []
+    for x, count in zip(channels, shape[:-1], strict=True):
         stride //= count
         position = _clipped(x) * float(count - 1)
         left = code.intrinsic("floor", position)
         left = code.select(left < count - 2.0, left, count - 2.0)
-        index = index + code.cast("fptosi", left, index.type) * stride
+        cells = cells + code.cast("fptosi", left, cells.type) * stride
         part = position - left
-        axes.append(((0, 1.0 - part), (stride, part)))
-    corners: list[tuple[int, Value | None]] = [(0, None)]
-    for axis in axes:
-        corners = [
-            (offset + step, part if weight is None else weight * part)
-            for offset, weight in corners
-            for step, part in axis
-        ]
-    totals = [code.constant(0.0, type)] * outputs
-    for offset, weight in corners:
-        for output in range(outputs):
-            here = code.address(base, type.element, offset + output)
-            value = code.gather(here, index, type)
-            totals[output] = totals[output] + (value if weight is None else weight * value)
-    return totals
+        sides = (1.0 - part, part)
+        offsets = [offset + step for offset in offsets for step in (0, stride)]
+        weights = [weight * side for weight in weights for side in sides] or list(sides)
+    return cells, offsets, weights
 
 
 def _clipped(x: Value) -> Value:

@@ -19,6 +19,9 @@ def load_channels(
 ) -> dict[int, Value]:
     """The used ones of all channels of as many rows as a vector has lanes."""
     loaded: dict[int, Value] = {}
+    used = list(used)
+    if not used:
+        return loaded
     if channels < _SIDE:
         rows = code.load(base, Type(type.element, type.lanes * channels), 0)
         for channel in used:
