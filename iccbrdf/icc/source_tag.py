@@ -18,6 +18,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 from iccbrdf.errors import ProfileError, UsageError
@@ -51,7 +52,7 @@ class CalculatorSource:
     """What one calculator was made from.
 
     tag, element: the signature of the tag that holds it, and its index among the tag's elements.
-    inputs, outputs: names of the channels, in order.  temporaries: named slots.
+    inputs, outputs: names of the channels, in order.  temporaries: named slots, none under two names.
     filename, source: the text that it was compiled from, and where that stood.
     """
 
@@ -62,6 +63,14 @@ class CalculatorSource:
     temporaries: tuple[Temporary, ...] = ()
     filename: str = ""
     source: str = ""
+
+    def __post_init__(self) -> None:
+        for one, next_one in pairwise(sorted(self.temporaries, key=lambda t: t.slot)):
+            if one.slot + one.size > next_one.slot:
+                raise UsageError(
+                    f"temporaries {one.name!r} and {next_one.name!r}: found both in slot {next_one.slot}, "
+                    "expected every slot in one"
+                )
 
 
 def source_tag(*calculators: CalculatorSource) -> Utf8:

@@ -13,7 +13,7 @@ from iccbrdf.errors import ProfileError, ProfileWarning, UsageError
 from iccbrdf.icc.elements import MultiProcess
 from iccbrdf.icc.profile import Profile
 from iccbrdf.icc.source_tag import CalculatorSource, read_sources
-from iccbrdf.icc.xml import luts  # noqa: F401
+from iccbrdf.icc.xml import calculator, luts, tags  # noqa: F401  (they add their forms to the tables)
 from iccbrdf.icc.xml.composite import NamedTags
 from iccbrdf.icc.xml.header import HEADER
 from iccbrdf.icc.xml.node import Document, Job, Node, Target, parse
@@ -38,16 +38,16 @@ def profile_to_xml(profile: Profile) -> bytes:
     LimitError
         The document would be too large for XML readers.
     """
-    tags = {signature: profile[signature] for signature in profile}
+    records = {signature: profile[signature] for signature in profile}
     root = etree.Element("IccProfile")
     out = Target(root, Job(profile.source, _names(profile)))
     try:
         HEADER.write(out.child("Header"), profile.header)
     except ValueError as error:
         raise ProfileError(f"{profile.source}: header: {error}") from None
-    _TAGS.write(out.child("Tags"), tags)
+    _TAGS.write(out.child("Tags"), records)
     etree.indent(root)
-    return etree.tostring(root, xml_declaration=True, encoding="UTF-8") + b"\n"
+    return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8")) + b"\n"
 
 
 def _names(profile: Profile) -> dict[int, CalculatorSource]:
@@ -60,8 +60,11 @@ def _names(profile: Profile) -> dict[int, CalculatorSource]:
     names = {}
     for source in sources:
         tag = profile.get(source.tag)
-        if isinstance(tag, MultiProcess) and 0 <= source.element < len(tag.elements):
-            names[id(tag.elements[source.element])] = source
+        if not isinstance(tag, MultiProcess) or not 0 <= source.element < len(tag.elements):
+            continue
+        element = tag.elements[source.element]
+        if len(source.inputs) <= element.inputs and len(source.outputs) <= element.outputs:
+            names[id(element)] = source
     return names
 
 
@@ -122,12 +125,12 @@ def _profile(root: Node, source: str) -> Profile:
     if root.name != "IccProfile":
         raise root.error("expected <IccProfile> as the outermost element")
     root.expect((), ("Header", "Tags"))
-    header, tags = (_child(root, name) for name in ("Header", "Tags"))
-    found: dict[str, Any] = _TAGS.read(tags)
+    header, body = (_child(root, name) for name in ("Header", "Tags"))
+    found: dict[str, Any] = _TAGS.read(body)
     try:
         return Profile(HEADER.read(header), found, source=source)
     except UsageError as error:
-        raise tags.error(str(error)) from None
+        raise body.error(str(error)) from None
 
 
 def _child(root: Node, name: str) -> Node:

@@ -99,7 +99,7 @@ _UNKNOWN = Form(
     UnknownElement,
     _Type(),
     *CHANNELS,
-    Attribute("Reserved", "reserved", RESERVED, bytes(4)),
+    Attribute("Reserved", "reserved", RESERVED, bytes(4), omitted=True),
     Content("data", HEX_LINES),
     signature="",
 )

@@ -56,13 +56,19 @@ def read_parts(parts: Sequence[Part], node: Node, seen: Seen) -> None:
 
 
 class Attribute(Part):
-    """An attribute; one that may be missing has a `default`, and then is written unless it is that."""
+    """An attribute.
 
-    def __init__(self, name: str, field: str, codec: Codec, default: Any = REQUIRED) -> None:
+    One that may be missing has a `default`; it is written all the same, unless `omitted` where it is that.
+    """
+
+    def __init__(
+        self, name: str, field: str, codec: Codec, default: Any = REQUIRED, *, omitted: bool = False
+    ) -> None:
         self.attributes = (name,)
         self.field = field
         self.codec = codec
         self.default = default
+        self.omitted = omitted
 
     def read(self, node: Node, seen: Seen) -> None:
         (name,) = self.attributes
@@ -73,7 +79,7 @@ class Attribute(Part):
 
     def write(self, out: Target, record: Any) -> None:
         value = getattr(record, self.field)
-        if value != self.default:
+        if value != self.default or not self.omitted:
             out.set(self.attributes[0], self.codec.write(value))
 
 
@@ -97,8 +103,8 @@ class Numbers(Part):
     `shape` gives the shape that they must fill; without it they are flat.  A line holds the last axis.
     """
 
-    attributes = ("Filename", "File", "Format", "FileEncoding", "StorageType", "Endian")
-    children = ("f", "n")
+    attributes: tuple[str, ...] = ("Filename", "File", "Format", "FileEncoding", "StorageType", "Endian")
+    children: tuple[str, ...] = ("f", "n")
 
     def __init__(
         self,
@@ -144,7 +150,10 @@ def read_numbers(node: Node, dtype: npt.DTypeLike, encoding: int) -> npt.NDArray
     """
     filename = node.attributes.get("Filename") or node.attributes.get("File")
     if not filename:
-        return node.value(numbers(dtype), " ".join([node.text, *(child.text for child in node)]))
+        inline: npt.NDArray[Any] = node.value(
+            numbers(dtype), " ".join([node.text, *(child.text for child in node)])
+        )
+        return inline
     for name, codec in (("FileEncoding", _FILE_ENCODING), ("StorageType", U16)):
         if name in node.attributes:
             encoding = node.value(codec, node.attributes[name], name)
@@ -155,8 +164,9 @@ def read_numbers(node: Node, dtype: npt.DTypeLike, encoding: int) -> npt.NDArray
     binary = node.value(_FILE_FORMAT, node.attributes.get("Format", "text"), "Format")
     path, data = node.document.named(node, filename)
     if binary:
-        order = "<" if node.attributes.get("Endian") == "little" else ">"
-        kind = np.dtype(stored).newbyteorder(order)
+        kind = np.dtype(stored)
+        if node.attributes.get("Endian") == "little":
+            kind = kind.newbyteorder("<")
         if len(data) % kind.itemsize:
             raise node.error(f"{path}: found {len(data)} bytes, no whole number of values")
         values = np.frombuffer(data, kind).astype(np.float64)
@@ -184,14 +194,14 @@ class Inside(Part):
         default: Callable[[Seen], Seen] | None = None,
         present: Callable[[Any], bool] = lambda record: True,
     ) -> None:
-        self.children = (name, *aliases)
+        self.children: tuple[str, ...] = (name, *aliases)
         self.name = name
         self.parts = parts
         self.default = default
         self.present = present
 
     def read(self, node: Node, seen: Seen) -> None:
-        child = node.child(*self.children or ())
+        child = node.child(*self.children)
         if child is not None:
             read_parts(self.parts, child, seen)
         elif self.default is not None:

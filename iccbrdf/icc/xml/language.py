@@ -20,8 +20,8 @@ from iccbrdf.icc.source_tag import SLOTS, CalculatorSource
 from iccbrdf.icc.xml.node import Node
 from iccbrdf.icc.xml.values import Codec
 
-MAX_TOKENS = 1 << 20
-"""Words of a main function once its macros are expanded: small files could stand for endless ones."""
+MAX_TOKENS = 1 << 18
+"""Words that the macros of a main function stand for: small files could stand for endless ones."""
 MAX_CALLS = 64
 """Macros that call one another."""
 
@@ -37,6 +37,7 @@ _SIZED = re.compile(rf"({_NAME})(?:[\[(](\d{{1,5}})[\])])?")
 
 _BARE = re.compile(r"(?<![^\s{}])(in|out|tget|tput|tsav)(?=\s*\}|\s+[^\s(\[{]|\s*$)")
 """What has no argument, which then is 0."""
+_LOST = re.compile(r"(?<![^\s{}])rot[lr](?=\s*\}|\s+[^\s(\[]|\s*$)")
 
 _MEMORY = ("tget", "tput", "tsav")
 _APPLY = tuple(name for name, row in OPERATORS.items() if row.operand is Operand.ELEMENT)
@@ -166,7 +167,11 @@ class _Expansion:
             for p in pieces
         )
         # As many line ends as there are lines before it in the file, so that errors name the file's lines.
-        return "\n" * (main.line - 1) + _BARE.sub(r"\1(0)", "".join(words))
+        text = _BARE.sub(r"\1(0)", "".join(words))
+        if lost := _LOST.search(text):
+            place = replace(place, line=place.line + text.count("\n", 0, lost.start()))
+            main.document.warn(place.error(f"{lost[0]} has no arguments: the ICC's iccToXml leaves them out"))
+        return "\n" * (main.line - 1) + text
 
     def _pieces(self, text: str, place: _Place, calls: tuple[str, ...]) -> Iterator[str | _Local]:
         for token in _TOKEN.finditer(text):
@@ -177,9 +182,9 @@ class _Expansion:
                 continue
             if token["comment"]:
                 continue
-            self.tokens += 1
+            self.tokens += place.macro is not None
             if self.tokens > MAX_TOKENS:
-                raise place.error(f"more than {MAX_TOKENS} words with the macros expanded", LimitError)
+                raise place.error(f"macros stand for more than {MAX_TOKENS} words", LimitError)
             word = token["word"]
             if call := _CALL.fullmatch(word):
                 yield from self._macro(call[1] or call[2], place, calls)
@@ -283,15 +288,16 @@ class _Expansion:
 
 def identifiers(names: Sequence[str]) -> list[str]:
     """The names as the dialect takes them: other characters become `_`, and equal ones get a number."""
-    result: list[str] = []
+    result: dict[str, None] = {}
+    counts: dict[str, int] = {}
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
-        plain = plain if is_name(plain) else f"_{plain}"
-        unique, count = plain, 2
+        unique = plain = plain if is_name(plain) else f"_{plain}"
         while unique in result:
-            unique, count = f"{plain}_{count}", count + 1
-        result.append(unique)
-    return result
+            counts[plain] = counts.get(plain, 1) + 1
+            unique = f"{plain}_{counts[plain]}"
+        result[unique] = None
+    return list(result)
 
 
 _STORED = re.compile(r"\b(in|out|tget|tput|tsav)\((\d+)(?:,(\d+))?\)")
@@ -309,7 +315,12 @@ def named(text: str, names: CalculatorSource | None, inputs: int) -> str:
     if names is None:
         return text
     channels = {"in": identifiers(names.inputs), "out": identifiers(names.outputs)}
-    variables = dict(zip(names.temporaries, identifiers([t.name for t in names.temporaries]), strict=True))
+    labels = identifiers([t.name for t in names.temporaries])
+    variables = {
+        slot: (temporary, label)
+        for temporary, label in zip(names.temporaries, labels, strict=True)
+        for slot in range(temporary.slot, temporary.slot + temporary.size)
+    }
 
     def name(match: re.Match[str]) -> str:
         operator, first, size = match[1], int(match[2]), int(match[3] or 1)
@@ -318,12 +329,13 @@ def named(text: str, names: CalculatorSource | None, inputs: int) -> str:
                 return match[0]
             count = f",{size}" if size > 1 else ""
             return f"{operator}{{{channels[operator][first]}{count}}}"
-        for temporary, variable in variables.items():
-            offset = first - temporary.slot
-            if offset >= 0 and offset + size <= temporary.size:
-                if size == temporary.size:
-                    return f"{operator}{{{variable}}}"
-                return f"{operator}{{{variable}[{offset}{f',{size}' if size > 1 else ''}]}}"
-        return match[0]
+        if first not in variables:
+            return match[0]
+        temporary, label = variables[first]
+        offset = first - temporary.slot
+        if offset + size > temporary.size:
+            return match[0]
+        part = "" if size == temporary.size else f"[{offset},{size}]" if size > 1 else f"[{offset}]"
+        return f"{operator}{{{label}{part}}}"
 
     return _STORED.sub(name, text)

@@ -148,14 +148,14 @@ class _Clut(Part):
     _parts = (Grid(), _Values())
 
     def read(self, node: Node, seen: Seen) -> None:
-        clut = node.child(*self.children)
+        clut = node.child("CLUT")
         seen["clut"] = None
         if clut is not None:
             read_parts(self._parts, clut, seen)
 
     def write(self, out: Target, record: LutAToB | LutBToA) -> None:
         if record.clut is not None:
-            child = out.child(*self.children)
+            child = out.child("CLUT")
             for part in self._parts:
                 part.write(child, record.clut)
 
@@ -182,13 +182,14 @@ class _Tables(Part):
 
     def __init__(self, name: str, field: str, encoding: int) -> None:
         self.children = (name,)
+        self.name = name
         self.field = field
         self.greatest = ENCODINGS[encoding][1]
 
     def read(self, node: Node, seen: Seen) -> None:
-        curves = node.child(*self.children)
+        curves = node.child(self.name)
         if curves is None:
-            raise node.error(f"no <{self.children[0]}> found in it, expected one")
+            raise node.error(f"no <{self.name}> found in it, expected one")
         curves.expect((), ("Curve",))
         rows = []
         for child in curves:
@@ -199,7 +200,7 @@ class _Tables(Part):
         seen[self.field] = np.array(rows) / self.greatest
 
     def write(self, out: Target, record: Any) -> None:
-        curves = out.child(*self.children)
+        curves = out.child(self.name)
         rows = np.rint(getattr(record, self.field).astype(np.float64) * self.greatest).astype(np.uint16)
         for row in rows:
             write_numbers(curves.child("Curve"), row)
@@ -214,10 +215,10 @@ class _SquareTable(Part):
         self.encoding = encoding
 
     def read(self, node: Node, seen: Seen) -> None:
-        clut = node.child(*self.children)
+        clut = node.child("CLUT")
         if clut is None:
             raise node.error("no <CLUT> found in it, expected one")
-        clut.expect(Grid.attributes, (*Grid.children, "TableData"))
+        clut.expect(Grid.attributes, ("GridPoints", "TableData"))
         Grid().read(clut, seen)
         table = clut.child("TableData")
         if table is None:
@@ -226,7 +227,7 @@ class _SquareTable(Part):
         seen["table"] = _read_table(table, seen, self.encoding)
 
     def write(self, out: Target, record: Any) -> None:
-        clut = out.child(*self.children)
+        clut = out.child("CLUT")
         clut.set("GridGranularity", str(record.table.shape[0]))
         _write_table(clut.child("TableData"), record.table, self.encoding)
 

@@ -29,9 +29,8 @@ from iccbrdf.icc.tags import (
     ViewingConditions,
 )
 from iccbrdf.icc.xml.arrays import NUMBER_FORMS, Triple, Wavelengths
-from iccbrdf.icc.xml.calculator import ELEMENT_FORMS
 from iccbrdf.icc.xml.composite import TYPE_FORMS
-from iccbrdf.icc.xml.elements import CHANNELS, CURVE_FORMS
+from iccbrdf.icc.xml.elements import CHANNELS, CURVE_FORMS, ELEMENT_FORMS
 from iccbrdf.icc.xml.forms import (
     Attribute,
     Content,
@@ -68,7 +67,7 @@ from iccbrdf.icc.xml.values import (
 class _Text(Part):
     """Text in one element or several, as such, in hexadecimal digits, or in a file."""
 
-    children = ("TextData", "HexTextData")
+    children: tuple[str, ...] = ("TextData", "HexTextData")
     _attributes = ("File",)
 
     def read(self, node: Node, seen: Seen) -> None:
@@ -180,13 +179,13 @@ TYPE_FORMS.add(
     Form(
         "dictType",
         Dictionary,
-        Attribute("RecordSize", "record_size", U32, 32),
+        Attribute("RecordSize", "record_size", U32, 32, omitted=True),
         Rows(
             "DictEntry",
             "entries",
             Entry,
             Attribute("Name", "name", TEXT),
-            Attribute("Value", "value", TEXT, None),
+            Attribute("Value", "value", TEXT, None, omitted=True),
             _Translations("LocalizedName", "display_name"),
             _Translations("LocalizedValue", "display_value"),
         ),
