@@ -180,6 +180,8 @@ def _require(holds: bool, op: str, arguments: Sequence[Node], rule: str) -> None
         raise GraphError(f"{op} of widths {[argument.width for argument in arguments]}: {rule}")
 
 
+_SINGLE = {op: takes(op) for op in OPERATORS if is_elementwise(op)}
+"""How many arguments of equal width the operators take that give one such vector."""
 _COUNTS = {
     "const": 0, "input": 0, "env": 0, "variable": 0, "defined": 0,
     "pick": 1, "splat": 1, "rotl": 1, "curve": 1, "tint": 1, "select": 3,
@@ -190,6 +192,8 @@ _COUNTS = {
 def _width(op: str, arguments: Sequence[Node], detail: Any, asked: int) -> int:
     """The width of a node, or GraphError where its parts do not fit."""
     widths = [argument.width for argument in arguments]
+    if _SINGLE.get(op) == len(widths) and widths.count(widths[0]) == len(widths):
+        return widths[0]
     if op in _COUNTS:
         _require(len(arguments) == _COUNTS[op], op, arguments, f"takes {_COUNTS[op]} argument(s)")
     if op == "const":

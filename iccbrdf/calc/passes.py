@@ -7,6 +7,7 @@ order of a sum, or would hide an overflow, such as 0 x = 0, is not here.
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -192,12 +193,16 @@ def rewrite(graph: Graph, rules: Sequence[Rule]) -> tuple[Graph, Counter[str]]:
     """
     Return a new graph in which the rules are applied to every live node once, and how often each was.
 
-    Only what the outputs need is rebuilt, so that this also removes dead nodes and shares equal ones.
+    Only what the outputs need is rebuilt, so that this also removes dead nodes and shares equal ones.  Where
+    rules are given and none applies, the graph itself is returned.
     """
-    result = Graph(dtype=graph.dtype)
     changes: Counter[str] = Counter()
+    live = graph.live()
+    if rules and not any(rule(graph, node) for node in live for rule in rules):
+        return graph, changes
+    result = Graph(dtype=graph.dtype)
     replaced: dict[Node, Node] = {}
-    for node in graph.live():
+    for node in live:
         arguments = [replaced[argument] for argument in node.arguments]
         candidate = result.add(node.op, arguments, node.detail, node.width)
         for rule in rules:
@@ -220,17 +225,19 @@ def optimise(graph: Graph, passes: Passes = PASSES) -> tuple[Graph, tuple[Report
         Report("share", total + repeated, total, _counted("repeated", repeated)),
         Report("remove dead code", total, live, _counted("unused", total - live)),
     ]
-    done = False
-    while not done:
-        done = True
-        for name, rules in passes:
-            rewritten, changes = rewrite(graph, rules)
-            if changes:
-                done = False
-                reports.append(
-                    Report(name, len(graph.live()), len(rewritten.live()), tuple(changes.most_common()))
-                )
-            graph = rewritten
+    # Each pass runs until it and all others have found nothing to do since anything changed.
+    idle = 0
+    for name, rules in itertools.cycle(passes):
+        if idle == len(passes):
+            break
+        rewritten, changes = rewrite(graph, rules)
+        idle += 1
+        if changes:
+            idle = 0
+            reports.append(
+                Report(name, len(graph.live()), len(rewritten.live()), tuple(changes.most_common()))
+            )
+        graph = rewritten
     # Rules leave behind what they replaced; a rewriting without rules keeps what is live.
     graph, _ = rewrite(graph, ())
     return graph, tuple(reports)
