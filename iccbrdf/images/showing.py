@@ -108,8 +108,9 @@ class Showing:
     exposure
         Factor on XYZ; above 1 for prints in dim light, below 1 to keep highlights from clipping.
     highlights
-        "clip": what is above white is cut off.  "roll-off": Y above 0.9 is compressed, so that it comes
-        near 1 and never reaches it, with the chromaticity kept: 1 - 0.1 exp(-(Y - 0.9) / 0.1).
+        "clip": what is above white is cut off.  "roll-off": Y above 0.9 is compressed to
+        1 - 0.1 exp(-(Y - 0.9) / 0.1), which never reaches 1, and the chromaticity goes to that of white in
+        the same measure, since no display has bright colours at its white.
     gamut_warning
         Whether pixels above white become cyan and those out of gamut magenta.  A pixel is out of gamut where
         what the display shows is 3 or more CIE 1976 units off.
@@ -158,6 +159,9 @@ class Showing:
 def _rolled_off(xyz: Array) -> Array:
     Y = xyz[..., 1:2]
     bright = np.maximum(Y, _KNEE)
-    compressed = 1 - (1 - _KNEE) * np.exp((_KNEE - bright) / (1 - _KNEE))
-    rolled: Array = xyz * (compressed / bright).astype(np.float32)
+    # The slope of the compressed Y, 1 at the knee and 0 at white.
+    left = np.exp((_KNEE - bright) / (1 - _KNEE))
+    compressed = 1 - (1 - _KNEE) * left
+    white = np.array(D50, np.float32)
+    rolled: Array = np.where(Y > _KNEE, compressed * (white + left * (xyz / bright - white)), xyz)
     return rolled

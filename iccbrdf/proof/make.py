@@ -17,7 +17,7 @@ from iccbrdf.brdf.primaries import read_primaries
 from iccbrdf.brdf.slopes import read_slopes
 from iccbrdf.build import build_colour_mid, build_pair, last_slope
 from iccbrdf.cmm import link, standard_XYZ
-from iccbrdf.errors import IccBrdfWarning, UsageError
+from iccbrdf.errors import IccBrdfWarning, InputWarning, UsageError
 from iccbrdf.files import atomic_output, check_target, make_folder, write_together
 from iccbrdf.icc import read_profile
 from iccbrdf.images import ImageSource, WithNormals, create_png, create_tiff
@@ -29,7 +29,7 @@ from iccbrdf.proof.colour_in import ColourIn
 from iccbrdf.proof.job import Job
 from iccbrdf.proof.reduced import Cell, Reduction, write_animation, write_sheet
 from iccbrdf.proof.relief import read_normals
-from iccbrdf.proof.render import BRDF, FLAT, Chain, Target, run
+from iccbrdf.proof.render import BRDF, FLAT, Chain, Counts, Target, run
 from iccbrdf.proof.scenes import INTENSITY, Scene, scenes, sweep
 
 PROFILES = ("colour-mid.icc", "mid.icc", "mvis.icc")
@@ -133,6 +133,7 @@ def _make(job: Job, overwrite: bool, workers: int, advance: Callable[[int, int],
         targets += [Target(cell, k, True) for k, cell in enumerate(moving, start=len(stills))]
         total = height * width
         counts = run(source, chain, targets, workers=workers, advance=lambda done: advance(done, total))
+        _warn_of(counts, chain.last_slope)
         # Before the pictures appear under their names, so that a failure leaves none of them.
         if small:
             cells = [Cell(s.light, s.view, cell.XYZ) for s, cell in zip(stills, small, strict=True)]
@@ -169,6 +170,20 @@ def _make(job: Job, overwrite: bool, workers: int, advance: Callable[[int, int],
             for name in (*PROFILES, *outputs.names)
         ],
     }
+
+
+def _warn_of(counts: Counts, last_slope: float | None) -> None:
+    for count, text in (
+        (counts.not_finite_in, "pixels of the flat print are no finite numbers"),
+        (counts.not_finite_out, "pixels of the scenes are no finite numbers"),
+        (
+            counts.beyond_slopes,
+            f"pixels are steeper than the last measured slope of {last_slope or 0:g} degrees, which holds "
+            "for them",
+        ),
+    ):
+        if count:
+            warnings.warn(f"{count} {text}", InputWarning, stacklevel=2)
 
 
 def _with_relief(job: Job, colours: ColourIn) -> ImageSource:

@@ -41,9 +41,13 @@ def path(value: Any, base: Path) -> Path:
 
 
 def display(value: Any, base: Path) -> str:
-    """The name of a display, or the path of a profile."""
+    """The name of a display, or the path of a profile, whose name has a suffix."""
     name = text(value, base)
-    return name if name in DISPLAYS else str(base / name)
+    if name in DISPLAYS:
+        return name
+    if not Path(name).suffix:
+        raise ValueError(f"a profile's file, or {' or '.join(DISPLAYS)}; {nearest(name, DISPLAYS)}")
+    return str(base / name)
 
 
 def flag(value: Any, base: Path) -> bool:
