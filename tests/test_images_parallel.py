@@ -18,6 +18,7 @@ from iccbrdf.errors import InputError, LimitError
 from iccbrdf.images import (
     Block,
     Place,
+    checks,
     create_tiff,
     in_order,
     open_tiff,
@@ -150,9 +151,9 @@ def test_steep_normals_are_counted_as_their_angles_are(tmp_path, name):
     pixels = np.stack([0 * angles, np.sin(angles), np.cos(angles)], axis=1, dtype=np.float32)
     names = ("n.x", "n.y", name)
     expected = 5 if name == "n.z" else 0
-    assert pipeline._steeper(pixels[np.newaxis], "real", names, 30.0) == expected
-    assert pipeline._steeper((pixels[np.newaxis] + 1) / 2, "device", names, 30.0) == expected
-    assert pipeline._steeper(pixels[np.newaxis], "real", names, None) == 0
+    assert checks.steeper(pixels[np.newaxis], "real", names, 30.0) == expected
+    assert checks.steeper((pixels[np.newaxis] + 1) / 2, "device", names, 30.0) == expected
+    assert checks.steeper(pixels[np.newaxis], "real", names, None) == 0
 
 
 @pytest.mark.parametrize("dtype", ["<f4", ">f4", "<f2", "<f8", ">f8"])

@@ -14,16 +14,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-from iccbrdf.brdf.models import NORMAL
 from iccbrdf.cmm import Transform, standard_XYZ
 from iccbrdf.errors import UsageError, nearest
 from iccbrdf.files import check_target
 from iccbrdf.icc import Profile
 from iccbrdf.images import ImageSource, Place, create_tiff, in_order
-from iccbrdf.images.float_range import all_within
+from iccbrdf.images.checks import not_finite, steeper
 
 TIFF_SUFFIXES = (".tif", ".tiff")
 PNG_SUFFIX = ".png"
@@ -132,9 +128,9 @@ def run(
             return _Worked(
                 pixels=place.height * place.width,
                 encoded=encoded,
-                not_finite_in=_not_finite(block.data),
-                not_finite_out=_not_finite(result.data),
-                beyond_slopes=_steeper(block.data, source.samples, transform.channels_in, last_slope),
+                not_finite_in=not_finite(block.data),
+                not_finite_out=not_finite(result.data),
+                beyond_slopes=steeper(block.data, source.samples, transform.channels_in, last_slope),
             )
 
         def take(worked: _Worked) -> None:
@@ -152,27 +148,6 @@ def run(
         counts = ("above_white", "out_of_gamut") if output.is_png else ("clipped",)
         done.outputs.append({"path": str(output.path), **{name: getattr(sink, name) for name in counts}})
     return done
-
-
-def _not_finite(data: npt.NDArray[Any]) -> int:
-    # Colours and device values are seldom negative, and then one look is enough.
-    if all_within(data, np.finfo(data.dtype).max):
-        return 0
-    return data.size - int(np.count_nonzero(np.isfinite(data)))
-
-
-def _steeper(data: npt.NDArray[Any], samples: str, names: Sequence[str], limit: float | None) -> int:
-    """The number of pixels whose normal leans by more than `limit` degrees, in 0..90; 0 without one."""
-    if limit is None or not set(NORMAL) <= set(names):
-        return 0
-    normals = (data[..., names.index(name)] for name in NORMAL)
-    x, y, z = (np.asarray(2 * n - 1 if samples == "device" else n, np.float64) for n in normals)
-    # float32 normals of just that slope are not steeper.
-    angle = np.radians(limit + 1e-3)
-    # The sine of the excess angle is above 0, without an arc tangent for each pixel.
-    with np.errstate(invalid="ignore"):
-        steeper = np.sqrt(x * x + y * y) * np.cos(angle) > z * np.sin(angle)
-    return int(np.count_nonzero(steeper))
 
 
 def _open(output: Output, source: ImageSource, transform: Transform, overwrite: bool) -> Any:

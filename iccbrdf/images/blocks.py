@@ -115,7 +115,11 @@ class Coverage:
     def count(self, block: Block) -> None:
         """Count a block as written."""
         height, width, _ = block.data.shape
-        self._missing -= height * width
+        self.count_pixels(height * width)
+
+    def count_pixels(self, pixels: int) -> None:
+        """Count so many pixels as written."""
+        self._missing -= pixels
 
     def check_filled(self) -> None:
         """UsageError unless as many pixels came as the image has."""

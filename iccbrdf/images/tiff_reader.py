@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
 from types import TracebackType
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from iccbrdf.errors import InputError, UsageError, nearest
 from iccbrdf.files import StrPath
 from iccbrdf.images.blocks import Array, Block, Place
-from iccbrdf.images.float_range import all_within
+from iccbrdf.images.checks import all_within
 from iccbrdf.images.record import SAMPLES, U1_15_ONE, Record, Samples, from_description
 from iccbrdf.images.tiff_storage import TiffStorage
 
@@ -52,6 +53,10 @@ def open_tiff(path: StrPath, samples: Samples | None = None, *, lab: bool = Fals
     return TiffSource(path, samples, lab=lab)
 
 
+def _reopened(path: str, samples: Samples | None, lab: bool) -> TiffSource:
+    return TiffSource(path, samples, lab=lab)
+
+
 class TiffSource:
     """An open TIFF.  See `open_tiff`.
 
@@ -75,6 +80,7 @@ class TiffSource:
         if samples is not None and samples not in SAMPLES:
             raise UsageError(f"{path}: unknown samples {samples!r}: {nearest(samples, SAMPLES)}")
         self._path = path
+        self._declared, self._lab = samples, lab
         self._storage = TiffStorage(path, lab=lab)
         self.height: int = self._storage.height
         self.width: int = self._storage.width
@@ -104,6 +110,10 @@ class TiffSource:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._storage.close()
+
+    def __reduce__(self) -> tuple[Callable[..., TiffSource], tuple[str, Samples | None, bool]]:
+        # An open file does not go to another process, which opens it itself.
+        return _reopened, (os.path.abspath(self._path), self._declared, self._lab)
 
     def _check_meaning(self, record: Record | None, declared: Samples | None) -> None:
         path, is_float = self._path, self.dtype.kind == "f"

@@ -10,6 +10,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -86,6 +87,11 @@ class TiffSink:
         self._coverage.count(encoded.block)
         self._put(encoded.block)
         self.clipped += encoded.clipped
+
+    def put_elsewhere(self, pixels: int, clipped: int) -> None:
+        """Count what copies of this sink have put in other processes; only of an uncompressed file."""
+        self._coverage.count_pixels(pixels)
+        self.clipped += clipped
 
     def finish(self) -> None:
         """UsageError where pixels are missing."""
@@ -219,6 +225,25 @@ def _check_parameters(
         raise UsageError(f"{path}: {rows_per_strip} rows per strip, expected at least 1")
 
 
+@dataclass(frozen=True)
+class _Places:
+    """Where the pixels of a file that has been laid out belong."""
+
+    path: Path
+    grid: Grid
+    offsets: tuple[int, ...]
+    pixel_bytes: int
+
+    def put(self, block: Block) -> None:
+        """Write a block to its place.  The file is opened for it, as several processes may do it."""
+        height, width, _ = block.data.shape
+        with self.path.open("r+b") as file:
+            for part in self.grid.parts(block.y0, block.x0, height, width):
+                for start, rows in self.grid.runs(part):
+                    file.seek(self.offsets[part.segment] + start * self.pixel_bytes)
+                    file.write(np.ascontiguousarray(block.data[rows, part.in_region[1]]).data)
+
+
 @contextmanager
 def _in_place(
     temporary: Path, grid: Grid, channels: int, dtype: np.dtype[Any], tags: dict[str, Any]
@@ -228,20 +253,11 @@ def _in_place(
     with tifffile.TiffWriter(temporary, bigtiff=size > _CLASSIC_BYTES, byteorder="<") as writer:
         writer.write(None, **tags)
     with tifffile.TiffFile(temporary) as laid_out:
-        offsets = laid_out.pages[0].dataoffsets
+        offsets = tuple(laid_out.pages[0].dataoffsets)
     if not tags["tile"]:
         # The strips of a new file follow each other: taken for one, rows are written at one go.
-        grid = Grid(grid.height, grid.width, grid.height, grid.width)
-    with temporary.open("r+b") as file:
-
-        def put(block: Block) -> None:
-            height, width, _ = block.data.shape
-            for part in grid.parts(block.y0, block.x0, height, width):
-                for start, rows in grid.runs(part):
-                    file.seek(offsets[part.segment] + start * pixel_bytes)
-                    file.write(np.ascontiguousarray(block.data[rows, part.in_region[1]]).data)
-
-        yield put
+        grid, offsets = Grid(grid.height, grid.width, grid.height, grid.width), offsets[:1]
+    yield _Places(temporary, grid, offsets, pixel_bytes).put
 
 
 @contextmanager

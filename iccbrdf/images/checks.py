@@ -1,0 +1,55 @@
+"""What is looked at in every block: cheap looks, as the rest costs little, too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from iccbrdf.brdf.models import NORMAL
+from iccbrdf.images.blocks import Array
+
+
+def all_within(data: Array, limit: float) -> bool:
+    """Whether all of `data`, floats of any size and byte order, are surely in 0..limit.
+
+    One pass without a temporary array, where comparisons would take several: as unsigned integers, the bits
+    of floats in 0..limit are those up to the bits of `limit`; those of infinity, NaN and whatever has a sign,
+    -0 included, are larger.
+    """
+    bits = data.dtype.str.replace("f", "u")
+    return bool(data.view(bits).max() <= np.full(1, limit, data.dtype).view(bits)[0])
+
+
+def not_finite(data: Array) -> int:
+    """The number of floats in `data` that are infinite or NaN."""
+    # Colours and device values are seldom negative, and then one look is enough.
+    if all_within(data, float(np.finfo(data.dtype).max)):
+        return 0
+    return data.size - int(np.count_nonzero(np.isfinite(data)))
+
+
+def steeper(data: Array, samples: str, names: Sequence[str], limit: float | None) -> int:
+    """The number of pixels whose normal leans by more than a limit.
+
+    Parameters
+    ----------
+    data
+        Pixels, shape (height, width, channels).
+    samples
+        "device", where a component n of a normal is stored as (n + 1)/2, or "real".
+    names
+        Of the channels.  Without a normal among them, none is steeper.
+    limit
+        Angle to the z axis in degrees, 0..90; None for no limit.
+    """
+    if limit is None or not set(NORMAL) <= set(names):
+        return 0
+    normals = (data[..., names.index(name)] for name in NORMAL)
+    x, y, z = (np.asarray(2 * n - 1 if samples == "device" else n, np.float64) for n in normals)
+    # float32 normals of just that slope are not steeper.
+    angle = np.radians(limit + 1e-3)
+    # The sine of the excess angle is above 0, without an arc tangent for each pixel.
+    with np.errstate(invalid="ignore"):
+        above = np.sqrt(x * x + y * y) * np.cos(angle) > z * np.sin(angle)
+    return int(np.count_nonzero(above))
