@@ -43,13 +43,13 @@ def join(before: Stage, after: Stage, *, absolute: bool) -> list[Step]:
 def _connection(here: str, before: Stage, after: Stage) -> list[Step]:
     """From the connection space `here` to that of `after`; a change of conditions is done on XYZ."""
     there = after.source.signature
-    steps: list[Step] = [Process.checked(p, place) for place, p in conversions(before.profile, after.profile)]
+    steps: list[Step] = [Process.checked(p, place) for place, p in conversions(before.viewing, after.viewing)]
     if here == there and not steps:
         return []
     if here == "Lab ":
-        steps.insert(0, LabToXYZ(conditions(before.profile).white))
+        steps.insert(0, LabToXYZ(conditions(before.viewing).white))
     if there == "Lab ":
-        steps.append(XYZToLab(conditions(after.profile).white))
+        steps.append(XYZToLab(conditions(after.viewing).white))
     return steps
 
 

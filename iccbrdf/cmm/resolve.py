@@ -38,9 +38,12 @@ class ResolvedCalculator:
 
 @dataclass(frozen=True)
 class Resolver:
-    """Makes the elements of one profile plain: `resolver(element, place)`."""
+    """Makes elements plain: `resolver(element, place)`.
 
-    profile: Profile
+    viewing: the profile whose viewing conditions spectra are seen under.
+    """
+
+    viewing: Profile
     interpolation: str
 
     def __call__(self, element: Any, place: str) -> Any:
@@ -68,8 +71,13 @@ class Resolver:
 
     @cached_property
     def observer(self) -> Observer:
-        """Whom the profile's spectra are seen by."""
-        return observer(self.profile)
+        """Whom the spectra are seen by."""
+        return observer(self.viewing)
+
+
+def holds_spectra(element: Any) -> bool:
+    """Whether an element is a spectral one, or a calculator that applies one."""
+    return element.signature in _SPECTRAL or any(map(holds_spectra, getattr(element, "elements", ())))
 
 
 def _wavelengths(element: Any) -> Wavelengths:

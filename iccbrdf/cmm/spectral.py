@@ -21,7 +21,7 @@ def to_XYZ(stage: Stage) -> list[Step]:
     """From the spectra that `stage` ends on to XYZ under the viewing conditions of its profile."""
     kind = _kind(stage)
     at = _wavelengths(stage.profile)
-    seen_by = observer(stage.profile)
+    seen_by = observer(stage.viewing)
     return [_matrix(seen_by.radiance(at) if kind == _EMITTED else seen_by.reflectance(at), stage)]
 
 
@@ -44,7 +44,7 @@ def to_spectra(before: Stage, after: Stage) -> list[Step]:
         )
     matrix = folded(np.eye(destination.steps), source, destination)
     if lights:
-        matrix = matrix * observer(before.profile).reflected(source)
+        matrix = matrix * observer(before.viewing).reflected(source)
     return [_matrix(matrix, before)]
 
 

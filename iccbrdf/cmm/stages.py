@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from iccbrdf.cmm.resolve import Resolver
+from iccbrdf.cmm.luts import TYPES, as_elements
+from iccbrdf.cmm.resolve import Resolver, holds_spectra
 from iccbrdf.cmm.spaces import Space, device_space, mcs_space, pcs_space, spectral_space
 from iccbrdf.cmm.steps import Process
 from iccbrdf.errors import ProfileError, ProfileWarning, UnsupportedError, nearest
@@ -33,15 +34,26 @@ class Stage:
     process: MultiProcess
     source: Space
     destination: Space
+    viewing: Profile
+    """Whose viewing conditions the connection space is under, and spectra are seen under.
+
+    Spectra before spectral elements bind these late: both profiles of such a pair are seen under the first
+    one's conditions, and nothing is converted between them.
+    """
 
     @property
     def where(self) -> str:
         """The tag's place, for messages."""
         return f"{self.profile.source}: tag {self.tag}"
 
+    @property
+    def is_spectral(self) -> bool:
+        """Whether the tag has elements that viewing conditions turn into others."""
+        return any(map(holds_spectra, self.process.elements))
+
     def step(self, interpolation: str) -> Process:
         """The tag as a step that is safe to run."""
-        return Process.checked(self.process, self.where, Resolver(self.profile, interpolation))
+        return Process.checked(self.process, self.where, Resolver(self.viewing, interpolation))
 
 
 def stages(chain: Sequence[Profile], intent: str, *, spectral: bool = True) -> list[Stage]:
@@ -53,7 +65,12 @@ def stages(chain: Sequence[Profile], intent: str, *, spectral: bool = True) -> l
     for i, profile in enumerate(chain):
         source = found[-1].destination if found else None
         following = chain[i + 1].header.device_class if i + 1 < len(chain) else ""
-        found.append(_stage(profile, source, following, INTENTS.index(intent), spectral))
+        stage = _stage(profile, source, following, INTENTS.index(intent), spectral)
+        if found and source is not None and stage.is_spectral:
+            before = found[-1]
+            if source.kind == "spectral" or (source.kind == "pcs" and before.is_spectral):
+                stage = replace(stage, viewing=before.viewing)
+        found.append(stage)
     return found
 
 
@@ -84,14 +101,14 @@ def _stage(profile: Profile, before: Space | None, following: str, intent: int, 
     else:
         tag, destination = _connection(profile, "D2B", ("D2B", "A2B"), intent, spectral)
         source = device_space(profile)
-    process = _multi_process(profile, tag)
+    process = _multi_process(profile, tag, source, destination)
     for side, space, found in (("in", source, process.inputs), ("out", destination, process.outputs)):
         if found != len(space.names):
             raise ProfileError(
                 f"{profile.source}: tag {tag} has {found} channels {side}, "
                 f"expected {len(space.names)} by the header ({space.text})"
             )
-    return Stage(profile, tag, process, source, destination)
+    return Stage(profile, tag, process, source, destination, profile)
 
 
 def _connection(
@@ -129,12 +146,15 @@ def _by_intent(profile: Profile, families: tuple[str, ...], intent: int) -> str:
     raise ProfileError(f"{profile.source}: none of the tags {wanted} is there")
 
 
-def _multi_process(profile: Profile, tag: str) -> MultiProcess:
+def _multi_process(profile: Profile, tag: str, source: Space, destination: Space) -> MultiProcess:
     value = profile.get(tag)
     if value is None:
         raise ProfileError(f"{profile.source}: tag {tag} is missing: {nearest(tag, profile)}")
+    if isinstance(value, TYPES):
+        return as_elements(value, source, destination, f"{profile.source}: tag {tag}")
     if not isinstance(value, MultiProcess):
         raise UnsupportedError(
-            f"{profile.source}: tag {tag} is of type {value.signature!r}; only processing elements can run"
+            f"{profile.source}: tag {tag} is of type {value.signature!r}; "
+            "only processing elements and look-up tables can run"
         )
     return value
