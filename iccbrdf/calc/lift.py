@@ -349,6 +349,14 @@ def _lab_to_xyz(lift: _Lift, lightness: Node, a: Node, b: Node) -> tuple[Node, N
     return inverse(fx), inverse(fy), inverse(fz)
 
 
+def _equal(lift: _Lift, a: Node, b: Node) -> Node:
+    """A NaN equals a NaN, which only matters where neither operand is a number for certain."""
+    same = lift.op("eq", a, b)
+    if any(node.op == "const" and not math.isnan(node.detail[0]) for node in (a, b)):
+        return same
+    return lift.op("vor", same, lift.op("vand", lift.op("neq", a, a), lift.op("neq", b, b)))
+
+
 def _cube(lift: _Lift, a: Node) -> Node:
     return lift.op("mul", lift.op("mul", a, a), a)
 
@@ -361,6 +369,8 @@ _EACH: Mapping[str, Callable[..., Any]] = {
     "sq": lambda lift, a: lift.op("mul", a, a),
     "cb": _cube,
     "near": _near,
+    "eq": _equal,
+    "neq": lambda lift, a, b: lift.op("not", _equal(lift, a, b)),
     "ctop": _cartesian_to_polar,
     "ptoc": _polar_to_cartesian,
     "tLab": _xyz_to_lab,

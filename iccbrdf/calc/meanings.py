@@ -121,8 +121,17 @@ def maximum(a: Value, b: Value) -> Value:
     return where(a > b, a, b)
 
 
+def equal(a: Value, b: Value) -> Value:
+    """The reference compares bits where there is a NaN: one NaN equals another."""
+    return truth((a == b) | (np.isnan(a) & np.isnan(b)), a)
+
+
+def differs(a: Value, b: Value) -> Value:
+    return 1 - equal(a, b)
+
+
 def compare(test: Callable[[Value, Value], Value]) -> Callable[[Value, Value], Value]:
-    """An IEEE comparison as an operator: nothing equals NaN, NaN included."""
+    """An IEEE comparison as an operator: false where there is a NaN."""
     return lambda a, b: truth(test(a, b), a)
 
 

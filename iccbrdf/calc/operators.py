@@ -5,8 +5,8 @@ line of text, what it is for.  Parser, listing, verifier, interpreter and docume
 
 Vector operators are planar: for n repetitions the stack holds all first operands, then all second ones.
 Source: ICC.2, calculatorElement; edge cases as the ICC's reference implementation computes them, except
-that temporaries and outputs start at 0, that `rnum` is 0 and `eq` false for every NaN, and that `solv`
-solves every shape of matrix.
+that temporaries and outputs start at 0, that `rnum` is 0 for every NaN, and that `solv` solves every shape of
+matrix.
 """
 
 from __future__ import annotations
@@ -319,8 +319,8 @@ _ROWS = (
     _each("ptoc", 2, 2, m.polar_to_cartesian, "radius, angle in degrees to x, y"),
     _each("lt", 2, 1, m.compare(np.less), "1 if a < b, else 0"),
     _each("le", 2, 1, m.compare(np.less_equal), "1 if a <= b, else 0"),
-    _each("eq", 2, 1, m.compare(np.equal), "1 if a = b, else 0 (so for NaN)"),
-    _each("neq", 2, 1, m.compare(np.not_equal), "1 if a differs from b (as NaN does), else 0"),
+    _each("eq", 2, 1, m.equal, "1 if a = b or both are NaN, else 0"),
+    _each("neq", 2, 1, m.differs, "0 if a = b or both are NaN, else 1"),
     _each("ge", 2, 1, m.compare(np.greater_equal), "1 if a >= b, else 0"),
     _each("gt", 2, 1, m.compare(np.greater), "1 if a > b, else 0"),
     _each("near", 2, 1, m.near, "1 if |a - b| < 1e-5, else 0"),
