@@ -10,7 +10,7 @@ import click
 from iccbrdf import images
 from iccbrdf.build import image_link, last_slope
 from iccbrdf.cli.options import emit, environment, force_option, json_option, name_list, scene_options
-from iccbrdf.cli.pipeline import Output, arranged_channels, check_outputs, run
+from iccbrdf.cli.pipeline import Output, arranged_channels, check_outputs, run, run_on_cluster
 from iccbrdf.cmm import INTENTS, link
 from iccbrdf.errors import UsageError
 from iccbrdf.icc import read_profile
@@ -34,6 +34,8 @@ Examples:
   Channels by name, for a TIFF from elsewhere:
     iccbrdf apply maps.tif -p mid.icc -p mvis.icc -o xyz.tif \\
       --channels kd.X,kd.Y,kd.Z,ks.X,ks.Y,ks.Z,m
+  A large image on a dask cluster whose machines share these files:
+    iccbrdf apply big.tif -p mid.icc -p mvis.icc -o xyz.tif --cluster tcp://10.0.0.5:8786
 """
 
 
@@ -92,6 +94,9 @@ def read_relief(
 @click.option("--workers", type=click.IntRange(1), default=lambda: min(processors(), MOST_WORKERS),
               show_default=f"the processors, at most {MOST_WORKERS}",
               help="Blocks of the image that are read and computed at a time.")  # fmt: skip
+@click.option("--cluster", metavar="ADDRESS",
+              help="Compute on a dask cluster: its scheduler's address, or local:N for N processes here.  "
+              "All its machines must see the files under the same paths.")  # fmt: skip
 @force_option
 @json_option
 def command(
@@ -115,6 +120,7 @@ def command(
     depth: str,
     double: bool,
     workers: int,
+    cluster: str | None,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -133,6 +139,8 @@ def command(
     targets = [Output(path, dtype, embedded, exposure, 16 if depth == "16" else 8) for path in outputs]
     check_outputs(targets, overwrite=force)
     variables = environment(light, view, env)
+    if cluster is not None and (normal_map or height_map):
+        raise UsageError("a cluster reads one image: leave --normals and --height out, or --cluster")
     normals = read_relief(normal_map, green, height_map, relief, pitch)
     with open_tiff(image, samples) as tiff:
         declared = name_list(channels) if channels is not None else None
@@ -152,16 +160,11 @@ def command(
         names = arranged_channels(source, transform.channels_in, declared)
         if names is not None:
             transform = link(chain, channels=names, **settings)
-        done = run(
-            source,
-            transform,
-            last,
-            targets,
-            overwrite=force,
-            label=image.name,
-            last_slope=last_slope(chain[0]),
-            workers=workers,
-        )
+        common: dict[str, Any] = {"overwrite": force, "last_slope": last_slope(chain[0])}
+        if cluster is None:
+            done = run(source, transform, last, targets, label=image.name, workers=workers, **common)
+        else:
+            done = run_on_cluster(source, transform, targets, cluster, **common)
         size = f"{source.width} x {source.height} pixels"
         result = {
             "image": str(image),

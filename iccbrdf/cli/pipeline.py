@@ -150,6 +150,35 @@ def run(
     return done
 
 
+def run_on_cluster(
+    source: ImageSource,
+    transform: Transform,
+    outputs: Sequence[Output],
+    cluster: str,
+    *,
+    overwrite: bool,
+    last_slope: float | None = None,
+) -> Done:
+    """As `run`, on the machines of a cluster (`iccbrdf.cluster`), into one TIFF."""
+    from iccbrdf.cluster import apply
+
+    if len(outputs) != 1 or outputs[0].is_png:
+        raise UsageError("a cluster writes one TIFF; make pictures and copies of it")
+    (output,) = outputs
+    met = apply(
+        transform,
+        source,
+        output.path,
+        cluster=cluster,
+        dtype=output.dtype,
+        profile=output.profile,
+        last_slope=last_slope,
+        overwrite=overwrite,
+    )
+    written = [{"path": str(output.path), "clipped": met.clipped}]
+    return Done(written, met.not_finite_in, met.not_finite_out, met.beyond_slopes)
+
+
 def _open(output: Output, source: ImageSource, transform: Transform, overwrite: bool) -> Any:
     if output.is_png:
         # Imported late, as codecs and displays are not needed for a TIFF.
