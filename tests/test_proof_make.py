@@ -377,6 +377,17 @@ def test_missing_inputs_and_impossible_jobs(run, tmp_path, image):
     assert list((tmp_path / "out").glob("*")) == []
 
 
+def test_animations_that_are_too_large(run, tmp_path, image):
+    path, _ = image
+    given = ("proof", path, "--primaries", PRIMARIES, "-o", tmp_path / "out", "--sweep", "60,0:60,90")
+    result = run(*given, "--frames", 1001)
+    assert (result.code, "1001 pictures" in result.err) == (4, True)
+    large = write_lab(tmp_path / "large.tif", np.broadcast_to(nodes()[0, :1], (300, 300, 3)))
+    result = run("proof", large, *given[2:], "--frames", 1000, "--sweep-size", 300)
+    assert (result.code, "90000000 pixels" in result.err) == (4, True)
+    assert list((tmp_path / "out").glob("*")) == []
+
+
 def test_normals_that_come_twice(run, tmp_path, image):
     path = tmp_path / "xyzn.tif"
     with create_tiff(path, 4, 5, ("X", "Y", "Z", "n.x", "n.y", "n.z"), samples="real") as sink:

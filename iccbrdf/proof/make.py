@@ -17,7 +17,7 @@ from iccbrdf.brdf.primaries import read_primaries
 from iccbrdf.brdf.slopes import read_slopes
 from iccbrdf.build import build_colour_mid, build_pair, last_slope
 from iccbrdf.cmm import link, standard_XYZ
-from iccbrdf.errors import IccBrdfWarning, InputWarning, UsageError
+from iccbrdf.errors import IccBrdfWarning, InputWarning, LimitError, UsageError
 from iccbrdf.files import atomic_output, check_target, make_folder, write_together
 from iccbrdf.icc import read_profile
 from iccbrdf.images import ImageSource, WithNormals, create_png, create_tiff
@@ -32,6 +32,8 @@ from iccbrdf.proof.relief import read_normals
 from iccbrdf.proof.render import BRDF, FLAT, Chain, Counts, Target, run
 from iccbrdf.proof.scenes import INTENSITY, Scene, scenes, sweep
 
+MAX_SMALL_PIXELS = 1 << 26
+"""Of contact sheet and animation together, which are held in memory at 32 bytes a pixel."""
 PROFILES = ("colour-mid.icc", "mid.icc", "mvis.icc")
 
 
@@ -129,6 +131,7 @@ def _make(job: Job, overwrite: bool, workers: int, advance: Callable[[int, int],
         pictures = [target.sink for target in targets if target.for_display]
         small = [Reduction(height, width, job.sheet_size) for _ in stills] if job.sheet else []
         moving = [Reduction(height, width, job.sweep_size) for _ in frames]
+        _check_size([*small, *moving])
         targets += [Target(cell, k, True) for k, cell in enumerate(small)]
         targets += [Target(cell, k, True) for k, cell in enumerate(moving, start=len(stills))]
         total = height * width
@@ -137,7 +140,8 @@ def _make(job: Job, overwrite: bool, workers: int, advance: Callable[[int, int],
         # Before the pictures appear under their names, so that a failure leaves none of them.
         if small:
             cells = [Cell(s.light, s.view, cell.XYZ) for s, cell in zip(stills, small, strict=True)]
-            write_sheet(job.output / outputs.sheet, job.image.name, cells, showing, overwrite=overwrite)
+            title = job.image.name.encode(errors="replace").decode()
+            write_sheet(job.output / outputs.sheet, title, cells, showing, overwrite=overwrite)
         if moving:
             kind = cast(Literal["png", "webp"], job.sweep_format)
             write_animation(
@@ -170,6 +174,15 @@ def _make(job: Job, overwrite: bool, workers: int, advance: Callable[[int, int],
             for name in (*PROFILES, *outputs.names)
         ],
     }
+
+
+def _check_size(small: Sequence[Reduction]) -> None:
+    pixels = sum(picture.height * picture.width for picture in small)
+    if pixels > MAX_SMALL_PIXELS:
+        raise LimitError(
+            f"contact sheet and animation have {pixels} pixels, the limit is {MAX_SMALL_PIXELS}: "
+            "make them smaller, or fewer"
+        )
 
 
 def _warn_of(counts: Counts, last_slope: float | None) -> None:

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from iccbrdf.errors import UsageError
+from iccbrdf.errors import LimitError, UsageError
 from iccbrdf.proof.job import Job
 from iccbrdf.scene import LIGHT, environment, parse_direction, parse_number
 
 INTENSITY = "litI"
+MAX_FRAMES = 1000
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.+-]*")
 _LOWEST = 0.01
@@ -46,10 +47,13 @@ def scenes(job: Job, intensity: float) -> list[Scene]:
 def sweep(job: Job, intensity: float) -> list[Scene]:
     """The scenes of the animation, seen from the first view; none where the job has no sweep.
 
-    A full turn leaves the last picture out, which would be the first again.  Raises UsageError as `scenes`.
+    A full turn leaves the last picture out, which would be the first again.  Raises UsageError as `scenes`,
+    LimitError for more than `MAX_FRAMES` pictures.
     """
     if job.sweep is None:
         return []
+    if job.frames > MAX_FRAMES:
+        raise LimitError(f"--frames: {job.frames} pictures of the animation, the limit is {MAX_FRAMES}")
     ends = [_angles(end) for end in job.sweep.split(":")]
     if len(ends) != 2:
         raise UsageError(f"--sweep {job.sweep!r}: expected FROM:TO, such as 60,0:60,360")
