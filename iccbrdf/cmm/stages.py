@@ -21,6 +21,8 @@ INTENTS = ("perceptual", "relative", "saturation", "absolute")
 _PREFERENCE = {0: (0, 1, 3, 2), 1: (1, 3, 0, 2), 2: (2, 0, 1, 3), 3: (3, 1, 0, 2)}
 _BY_THE_BOOK = {0: (0,), 1: (1, 3, 0), 2: (2, 0), 3: (3, 1, 0)}
 
+_NO_PIXELS = {"nmcl": "named colours", "cenc": "a colour encoding"}
+
 _CANNOT_RUN = ("M2S", "D2B", "B2D", "rTRC", "kTRC")
 """Tags that may hold a profile's only transform, where it is for spectra or no processing elements."""
 
@@ -80,6 +82,10 @@ def _stage(profile: Profile, before: Space | None, following: str, intent: int, 
     if profile.header.version[0] < 5:
         raise UnsupportedError(
             f"{profile.source}: version {profile.header.version[0]}; only version 5 profiles link here"
+        )
+    if device_class in _NO_PIXELS:
+        raise UnsupportedError(
+            f"{profile.source}: class {device_class!r} ({_NO_PIXELS[device_class]}) has no transform of pixels"
         )
     to_mcs = profile.header.mcs and "A2M0" in profile and following in ("mvis", "mlnk")
     if device_class == "mid " or to_mcs:
