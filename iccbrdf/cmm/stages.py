@@ -85,7 +85,8 @@ def _stage(profile: Profile, before: Space | None, following: str, intent: int, 
         )
     if device_class in _NO_PIXELS:
         raise UnsupportedError(
-            f"{profile.source}: class {device_class!r} ({_NO_PIXELS[device_class]}) has no transform of pixels"
+            f"{profile.source}: class {device_class!r}, {_NO_PIXELS[device_class]}, "
+            "has no transform of pixels"
         )
     to_mcs = profile.header.mcs and "A2M0" in profile and following in ("mvis", "mlnk")
     if device_class == "mid " or to_mcs:
