@@ -20,6 +20,7 @@ COMMANDS = {
     "evaluate": "Run the papers' experiments on measurements.",
     "build": "Make a MID and an MVIS profile from a primaries file.",
     "apply": "Map an image through profiles: XYZ TIFFs and PNG softproofs.",
+    "proof": "Proof print jobs on a relief, under several lights.",
     "dump": "Show what a profile holds.",
     "validate": "Check whether profiles are sound.",
     "diff": "Show what differs between two profiles.",
