@@ -48,7 +48,8 @@ def test_json(run, tmp_path):
     assert built["schema"] == "iccbrdf.build/1"
     assert built["model"] == "brdf1"
     assert built["effects"] == [
-        "specular", "fresnel", "shadowing", "chromatic_specular", "relief", "below_horizon"
+        "specular", "fresnel", "shadowing", "chromatic-specular", "relief", "below-horizon", "highlight-range",
+        "interpolation",
     ]  # fmt: skip
     assert built["channels"] == ["kd.X", "kd.Y", "kd.Z", "ks.X", "ks.Y", "ks.Z", "m", "n.x", "n.y", "n.z"]
     assert built["variables"]["litI"] == np.pi
@@ -57,8 +58,8 @@ def test_json(run, tmp_path):
 
 def test_effects_and_without_say_the_same(run, tmp_path):
     fewer = run("build", PRIMARIES, "-o", tmp_path / "a", "--without", "fresnel, shadowing", "--json").json
-    chosen = "specular,chromatic_specular,relief,below_horizon"
-    run("build", PRIMARIES, "-o", tmp_path / "b", "--effects", chosen)
+    chosen = "specular,chromatic-specular,relief,below-horizon,highlight-range,interpolation"
+    run("build", PRIMARIES, "-o", tmp_path / "b", "--effects", chosen.replace("-", "_"))
     assert fewer["effects"] == chosen.split(",")
     assert fewer["executed"] < 134
     assert (tmp_path / "a" / "mvis.icc").read_bytes() == (tmp_path / "b" / "mvis.icc").read_bytes()

@@ -7,16 +7,23 @@ encoding of the binding MID, so that the BRDF image itself can be written.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from iccbrdf.brdf.interpolation import InterpolationMethod, interpolate
+from iccbrdf.brdf.models import MODELS as SCIENCE
+from iccbrdf.brdf.models import NORMAL
 from iccbrdf.brdf.primaries import Primaries, check_nodes
 from iccbrdf.brdf.slopes import Slopes, published_jumps
 from iccbrdf.brdf.smooth_interpolation import SmoothMap
+from iccbrdf.build.effects import chosen_effects, effect_names
 from iccbrdf.build.models import MODELS
 from iccbrdf.build.private_tags import IMAGE_TAG, SLOPES_TAG, image_encoding
-from iccbrdf.build.profiles import decoding, ranges, text_tags
+from iccbrdf.build.profiles import decoding, device_channels, ranges, text_tags
 from iccbrdf.calc import Compiled, compile_chain
 from iccbrdf.calc import listing as program_listing
 from iccbrdf.errors import InputError, UsageError, nearest
@@ -25,6 +32,8 @@ from iccbrdf.resources import folder
 
 INTERPOLATIONS = ("smooth", "published")
 SLOPE_METHODS = ("affine", "published")
+DEVICE = ("X", "Y", "Z", *NORMAL)
+"""What a colour MID takes, used or not."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +43,8 @@ class ColourMid:
     mid: Profile
     listing: str
     compiled: Compiled
+    effects: Mapping[str, bool]
+    """The effects that this program holds, by name."""
 
     @property
     def files(self) -> dict[str, bytes]:
@@ -52,6 +63,11 @@ def build_colour_mid(
     slope_method: str = "affine",
     p: float = 2.0,
     exponent: float = -1.0,
+    effects: Collection[str] | None = None,
+    without: Collection[str] = (),
+    reference: ArrayLike | None = None,
+    device: Sequence[str] | None = None,
+    note: str = "",
 ) -> ColourMid:
     """Build the colour MID of a set of primaries.
 
@@ -67,13 +83,25 @@ def build_colour_mid(
         `affine` or `published`.
     p, exponent
         Norm of the chromaticity distance and exponent of the weights, for `published`.
+    effects
+        Names of the effects to simulate (`iccbrdf.build.effects`); default: all.  Without `interpolation` the
+        gloss is that of one colour, without `specular` and `relief` an MVIS without these is served.
+    without
+        Names of effects to leave out.
+    reference
+        XYZ of the colour whose gloss holds without `interpolation`; default: the mean of the primaries.
+    device
+        Device channels, where an image has more than the effects call for; default: no more.
+    note
+        What the description says besides.
 
     Raises
     ------
     InputError
         Nodes too few, too many or too close; slopes measured under other conditions than the primaries.
     UsageError
-        A method is unknown, or `p` or `exponent` is out of range.
+        A method or an effect is unknown, `p` or `exponent` is out of range, `slope` is asked for without
+        `slopes`, or `device` lacks a channel.
     """
     for value, valid, what in (
         (interpolation, INTERPOLATIONS, "interpolation"),
@@ -86,8 +114,27 @@ def build_colour_mid(
     check_nodes(primaries)
     if slopes is not None:
         _check_slopes(primaries, slopes)
-    names = [f"interpolate_{interpolation}.calc"]
-    constants = _nodes(primaries, interpolation, p, exponent)
+    if slopes is None and effects is not None and "slope" in effect_names(effects):
+        raise UsageError("the effect 'slope' is asked for, but there are no slopes, which it needs")
+    chosen = chosen_effects(primaries.model, effects, without)
+    if not chosen["slope"]:
+        slopes = None
+    model = MODELS[primaries.model]
+    used = len(SCIENCE[primaries.model].channels) if chosen["specular"] else model.matte_parameters
+    if chosen["interpolation"]:
+        names = [f"interpolate_{interpolation}.calc"]
+        constants = _nodes(primaries, interpolation, p, exponent, used)
+    else:
+        names = ["interpolate_constant.calc"]
+        colour = np.mean(primaries.XYZ, axis=0) if reference is None else np.asarray(reference, np.float64)
+        method: InterpolationMethod = "published" if interpolation == "published" else "smooth"
+        parameters = interpolate(colour, primaries, method=method, p=p, exponent=exponent)
+        constants = {
+            "brdf": primaries.model,
+            "white": primaries.white,
+            "offset": parameters[:3] - colour,
+            "gloss": parameters[3 : max(used, 4)],
+        }
     if slopes is not None:
         names.insert(0, "slope_adjust.calc")
         constants |= {
@@ -98,13 +145,16 @@ def build_colour_mid(
         }
     templates = folder("calc_templates")
     texts = [((templates / name).read_text(encoding="utf-8"), name) for name in names]
-    compiled = compile_chain(texts, constants=constants)
+    switches = {name: chosen[name] for name in ("specular", "relief")}
+    compiled = compile_chain(texts, constants=constants, effects=switches)
     adjustment = f"{slope_method} slope adjustment" if slopes is not None else "no slope adjustment"
-    title = f"{MODELS[primaries.model].title}, {interpolation} interpolation, {adjustment}"
+    means = f"{interpolation} interpolation" if chosen["interpolation"] else "one gloss"
+    title = f"{model.title}, {means}, {adjustment}{note}"
     return ColourMid(
-        mid=_mid(compiled, title, primaries, slopes),
+        mid=_mid(compiled, title, primaries, slopes, device_channels(device, compiled.inputs)),
         listing="\n".join(_lines(compiled, title, slopes)) + "\n",
         compiled=compiled,
+        effects={"slope": slopes is not None, "interpolation": chosen["interpolation"]},
     )
 
 
@@ -118,35 +168,38 @@ def _check_slopes(primaries: Primaries, slopes: Slopes) -> None:
             raise InputError(f"{file}: {what}: found {found!r}, expected that of the primaries, {expected!r}")
 
 
-def _nodes(primaries: Primaries, interpolation: str, p: float, exponent: float) -> dict[str, Any]:
-    """The constants of the interpolation templates."""
+def _nodes(primaries: Primaries, interpolation: str, p: float, exponent: float, used: int) -> dict[str, Any]:
+    """The constants of the interpolation templates, for the first `used` of the parameters."""
     constants: dict[str, Any] = {"brdf": primaries.model, "white": primaries.white}
     if interpolation == "smooth":
         solved = SmoothMap.of(primaries)
         return constants | {
             "coded_nodes": solved.nodes,
-            "coefficients": solved.coefficients,
-            "constant_terms": solved.constant,
+            "coefficients": solved.coefficients[:, :used],
+            "constant_terms": solved.constant[:used],
         }
     return constants | {
         "node_XYZ": primaries.XYZ,
         "node_kd": primaries.parameters[:, :3],
-        "node_gloss": primaries.parameters[:, 3:],
+        # A table has a column at least.
+        "node_gloss": primaries.parameters[:, 3 : max(used, 4)],
         "p": p,
         "exponent": exponent,
     }
 
 
-def _mid(compiled: Compiled, title: str, primaries: Primaries, slopes: Slopes | None) -> Profile:
+def _mid(
+    compiled: Compiled, title: str, primaries: Primaries, slopes: Slopes | None, device: Sequence[str]
+) -> Profile:
     """Device -> real by a matrix, real -> parameters by the program."""
-    n_in, n_out = len(compiled.inputs), len(compiled.outputs)
-    decode = decoding(ranges(compiled.inputs, {}))
+    n_device, n_in, n_out = len(device), len(compiled.inputs), len(compiled.outputs)
+    decode = decoding(compiled.inputs, ranges(compiled.inputs, {}), device)
     program = Calculator(inputs=n_in, outputs=n_out, program=compiled.program)
-    header = Header(device_class="mid ", colour_space=f"nc{n_in:04x}", mcs=f"mc{n_out:04x}")
+    header = Header(device_class="mid ", colour_space=f"nc{n_device:04x}", mcs=f"mc{n_out:04x}")
     tags = {
         **text_tags(f"Colour MID for {title}", compiled.outputs),
-        "clrt": ColorantTable.of(compiled.inputs),
-        "A2M0": MultiProcess(n_in, n_out, (decode, program)),
+        "clrt": ColorantTable.of(device),
+        "A2M0": MultiProcess(n_device, n_out, (decode, program)),
         IMAGE_TAG: image_encoding(compiled.outputs, primaries),
     }
     if slopes is not None:

@@ -37,7 +37,7 @@ def _lines(
         text = constant if isinstance(constant, str) else " ".join(f"{value:g}" for value in constant)
         yield f"    {name} = {text}"
     for state, heading in ((True, "effects simulated"), (False, "effects left out")):
-        names = [name for name, on in compiled.effects.items() if on is state]
+        names = [name.replace("_", "-") for name, on in compiled.effects.items() if on is state]
         yield f"  {heading}: {', '.join(names) or 'none'}"
     yield ""
     yield (

@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 
 from iccbrdf.brdf.primaries import Primaries
+from iccbrdf.build.effects import EFFECTS, MVIS, chosen_effects
 from iccbrdf.build.listing import listing
 from iccbrdf.build.models import MODELS, Model
-from iccbrdf.build.profiles import Range, decoding, ranges, text_tags
+from iccbrdf.build.profiles import Range, decoding, device_channels, ranges, text_tags
 from iccbrdf.build.viewing import Viewing, viewing
 from iccbrdf.calc import Compiled, compile_template
 from iccbrdf.errors import UsageError, nearest
-from iccbrdf.icc import XYZ, Calculator, Header, MultiProcess, NumberArray, Profile
+from iccbrdf.icc import XYZ, Calculator, ColorantTable, Header, MultiProcess, NumberArray, Profile
 from iccbrdf.resources import folder
 
 
@@ -31,6 +32,8 @@ class Pair:
     mvis: Profile
     listing: str
     compiled: Compiled
+    effects: Mapping[str, bool]
+    """The effects that the MVIS may hold, by name, and whether it does."""
 
     @property
     def files(self) -> dict[str, bytes]:
@@ -49,6 +52,8 @@ def build_pair(
     without: Collection[str] = (),
     fresnel_angle: str | None = None,
     variables: Mapping[str, float] | None = None,
+    device: Sequence[str] | None = None,
+    note: str = "",
 ) -> Pair:
     """Build the profiles of the model, the viewing conditions and the encoding that `primaries` states.
 
@@ -57,35 +62,40 @@ def build_pair(
     primaries
         As `iccbrdf.brdf.read_primaries` gives them.
     effects
-        Names of the effects to simulate; default: all that the model has.
+        Names of the effects to simulate (`iccbrdf.build.effects`); those of the colour MID do nothing here.
+        Default: all that the model has.
     without
         Names of effects to leave out.
     fresnel_angle
         `theta_i` (as printed) or `alpha` (between half vector and view: reciprocal); default: `theta_i`.
     variables
         Values of run-time variables that hold where the CMM's environment sets none.
+    device
+        Device channels of the MID, where an image has more than the effects call for; default: no more.
+    note
+        What the descriptions say besides.
 
     Raises
     ------
     UsageError
-        An effect or a variable is unknown, or `fresnel_angle` is given and there is no Fresnel term.
+        An effect or a variable is unknown, `device` lacks a channel, or `fresnel_angle` is given and there is
+        no Fresnel term.
     """
     variables = variables or {}
     model = MODELS[primaries.model]
     path = folder("calc_templates") / model.template
-    constants: dict[str, Any] = {"white": primaries.white}
+    constants: dict[str, Any] = {"white": primaries.white, **model.choices}
     if model.has_refractive_index:
         constants["refractive_index"] = primaries.refractive_index
     if fresnel_angle is not None:
         constants["fresnel_angle"] = fresnel_angle
     template = path.read_text(encoding="utf-8")
     declared = compile_template(template, filename=path.name)
-    choosable = [name for name in declared.effects if name not in model.effects]
-    _check_names("effect", (*(effects or ()), *without), choosable, model)
     _check_names("run-time variable", variables, declared.variables, model)
     chosen = {
-        name: name not in without and (declared.effects[name] if effects is None else name in effects)
-        for name in choosable
+        name: on
+        for name, on in chosen_effects(primaries.model, effects, without).items()
+        if EFFECTS[name].program == MVIS
     }
     if fresnel_angle is not None and not chosen.get("fresnel"):
         raise UsageError(f"a Fresnel angle is given, but {model.title} has no Fresnel term or it is left out")
@@ -93,14 +103,15 @@ def build_pair(
         template,
         filename=path.name,
         constants=constants,
-        effects={**chosen, **model.effects},
+        effects={**{EFFECTS[name].switch: on for name, on in chosen.items()}, **model.effects},
         variables=variables,
     )
     conditions = viewing(primaries.illuminant, primaries.observer, primaries.white)
     limits = ranges(compiled.inputs, primaries.encoding)
-    mid = _mid(compiled.inputs, limits, model.title)
-    mvis = _mvis(compiled, conditions, model.title)
-    return Pair(mid, mvis, listing(model.title, compiled, limits, conditions), compiled)
+    title = f"{model.title}{note}"
+    mid = _mid(compiled.inputs, limits, device_channels(device, compiled.inputs), title)
+    mvis = _mvis(compiled, conditions, title)
+    return Pair(mid, mvis, listing(title, compiled, limits, conditions), compiled, chosen)
 
 
 def _check_names(what: str, names: Iterable[str], valid: Collection[str], model: Model) -> None:
@@ -109,11 +120,14 @@ def _check_names(what: str, names: Iterable[str], valid: Collection[str], model:
             raise UsageError(f"{model.title} has no {what} {name!r}: {nearest(name, valid)}")
 
 
-def _mid(channels: Sequence[str], limits: Sequence[Range], name: str) -> Profile:
-    n = len(channels)
-    header = Header(device_class="mid ", colour_space=f"nc{n:04x}", mcs=f"mc{n:04x}")
-    decode = MultiProcess(n, n, (decoding(limits),))
-    return Profile(header, {**text_tags(f"MID for {name}", channels), "A2M0": decode})
+def _mid(channels: Sequence[str], limits: Sequence[Range], device: Sequence[str], name: str) -> Profile:
+    n, n_device = len(channels), len(device)
+    header = Header(device_class="mid ", colour_space=f"nc{n_device:04x}", mcs=f"mc{n:04x}")
+    tags: dict[str, Any] = text_tags(f"MID for {name}", channels)
+    if tuple(device) != tuple(channels):
+        tags["clrt"] = ColorantTable.of(device)
+    decode = decoding(channels, limits, device)
+    return Profile(header, {**tags, "A2M0": MultiProcess(n_device, n, (decode,))})
 
 
 def _mvis(compiled: Compiled, conditions: Viewing, name: str) -> Profile:

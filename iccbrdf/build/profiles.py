@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from iccbrdf.brdf.models import NORMAL
+from iccbrdf.errors import UsageError
 from iccbrdf.icc import Matrix, Mluc, TagArray
 
 COPYRIGHT = "No copyright, use freely"
@@ -35,10 +36,25 @@ def ranges(channels: Sequence[str], encoding: Mapping[str, float]) -> list[Range
     return [known.get(name, (0.0, encoding.get(name.partition(".")[0], 1.0))) for name in channels]
 
 
-def decoding(limits: Sequence[Range]) -> Matrix:
-    """Device values in 0..1 -> real values."""
+def decoding(channels: Sequence[str], limits: Sequence[Range], device: Sequence[str]) -> Matrix:
+    """Device values in 0..1 -> the real values of `channels`, which are among the `device` channels."""
     low, high = np.array(limits, np.float32).T
-    return Matrix(inputs=len(limits), matrix=np.diag(high - low), offset=low)
+    matrix = np.zeros((len(channels), len(device)), np.float32)
+    matrix[np.arange(len(channels)), [device.index(channel) for channel in channels]] = high - low
+    return Matrix(inputs=len(device), matrix=matrix, offset=low)
+
+
+def device_channels(device: Sequence[str] | None, needed: Sequence[str]) -> tuple[str, ...]:
+    """The device channels of a MID that needs some of them: `device`, by default no others than `needed`.
+
+    Raises UsageError where one that is needed is missing.
+    """
+    if device is None:
+        return tuple(needed)
+    missing = [name for name in needed if name not in device]
+    if missing:
+        raise UsageError(f"device channels {', '.join(device)}: {missing[0]!r} is missing, which is needed")
+    return tuple(device)
 
 
 def encoding(limits: Sequence[Range]) -> Matrix:

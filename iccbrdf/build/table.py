@@ -149,7 +149,7 @@ def build_table_mid(
             **text_tags(f"Colour MID for {_title(primaries, method, grid)}", channels_out),
             "clrt": ColorantTable.of(channels_in),
             IMAGE_TAG: image_encoding(channels_out, primaries),
-            "A2M0": MultiProcess.of(decoding(ranges(channels_in, {})), calculator),
+            "A2M0": MultiProcess.of(decoding(channels_in, ranges(channels_in, {}), channels_in), calculator),
         },
     )
 

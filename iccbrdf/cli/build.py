@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import click
 
@@ -87,10 +87,13 @@ def command(
     if effects is not None and without is not None:
         raise UsageError("--effects and --without are two ways to say one thing: give one of them")
     source = read_primaries(primaries)
+    switched: dict[str, Any] = {
+        "effects": name_list(effects) if effects is not None else None,
+        "without": name_list(without or ""),
+    }
     pair = build_pair(
         source,
-        effects=name_list(effects) if effects is not None else None,
-        without=name_list(without or ""),
+        **switched,
         fresnel_angle=fresnel_angle,
         variables=environment(light, view, env),
     )
@@ -107,6 +110,7 @@ def command(
             slope_method=slope_method or "affine",
             p=p,
             exponent=exponent,
+            **switched,
         )
         built |= colour.files
     tables = None
@@ -119,7 +123,8 @@ def command(
     files = {folder / name: data for name, data in built.items()}
     write_together(files, overwrite=force)
     compiled = pair.compiled
-    simulated = [name for name, on in compiled.effects.items() if on]
+    held = {**pair.effects, **(colour.effects if colour else {})}
+    simulated = [name for name, on in held.items() if on]
     result = {
         "primaries": str(primaries),
         "model": source.model,
