@@ -382,9 +382,7 @@ def literal(value: float, element: str) -> str:
 def _each_lane(name: str, function: str, type: Type, count: int) -> str:
     """A function on vectors that calls one on numbers in a loop."""
     names = [f"%a{i}" for i in range(count)]
-    extracted = [
-        f"  %s{i} = extractelement {type} %a{i}, i64 %lane" for i in range(count)
-    ]
+    extracted = [f"  %s{i} = extractelement {type} %a{i}, i64 %lane" for i in range(count)]
     return "\n".join(
         [
             f"define internal {type} {name}({', '.join(f'{type} {n}' for n in names)}) noinline {{",
@@ -404,4 +402,3 @@ def _each_lane(name: str, function: str, type: Type, count: int) -> str:
             "}",
         ]
     )
-
