@@ -5,7 +5,9 @@ import pytest
 from cmm_examples import mid, reference
 from colour.appearance import ciecam02
 
+import iccbrdf
 from iccbrdf.calc.elements import apply
+from iccbrdf.errors import ProfileError
 from iccbrdf.icc import JabToXYZ, MultiProcess, XYZToJab
 
 WHITE = (96.42, 100.0, 82.49)
@@ -89,6 +91,15 @@ def test_black_greys_and_colours_outside():
     grey = run(back, [[50, 0, 0]])[0]
     assert run(forward, [grey])[0] == pytest.approx([50, 0, 0], abs=1e-9)
     assert np.isnan(run(forward, [[np.nan, 1, 1]])).any()
+
+
+@pytest.mark.parametrize(
+    "changed", [{"white": (1, 0, 1)}, {"luminance": 0}, {"background": -1}, {"surround": 0}]
+)
+def test_conditions_that_no_model_is_made_for(changed):
+    broken = JabToXYZ(**{"white": WHITE, **changed})
+    with pytest.raises(ProfileError, match=r"element 0 .JtoX.: found white .* expected them above 0"):
+        iccbrdf.link([mid("abc", MultiProcess.of(broken))])
 
 
 def test_uniform_colours_stay_numbers():

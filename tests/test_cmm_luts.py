@@ -116,7 +116,7 @@ def test_what_has_no_meaning():
 
 @pytest.mark.parametrize("device_class", ["nmcl", "cenc"])
 def test_classes_without_transforms(device_class):
-    with pytest.raises(UnsupportedError, match=f"class '{device_class}' .* has no transform of pixels"):
+    with pytest.raises(UnsupportedError, match=f"class '{device_class}', .* has no transform of pixels"):
         iccbrdf.link([device_profile(device_class)])
 
 

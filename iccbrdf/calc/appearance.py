@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from iccbrdf.calc.meanings import Value, where
+from iccbrdf.errors import ProfileError
 
 CONES: npt.NDArray[Any] = np.array(
     [[0.38970, 0.68898, -0.07868], [-0.22981, 1.18340, 0.04641], [0.0, 0.0, 1.0]]
@@ -30,6 +31,16 @@ EXPONENT, STEEPER, RATIO, KNEE = 0.42, 0.3169, 0.2307, 4 / 255
 _NOISE = 0.1
 _BLACKEST = 1e-5
 """Lightness below which a colour is black."""
+
+
+def check_conditions(element: Any, where: str) -> None:
+    """Raise ProfileError, which begins with `where`, for conditions that the model is not made for."""
+    numbers = (*element.white, element.luminance, element.background, element.surround)
+    if not all(number > 0 for number in numbers):
+        raise ProfileError(
+            f"{where}: found white {tuple(element.white)}, luminance {element.luminance}, "
+            f"background {element.background} and surround {element.surround}, expected them above 0"
+        )
 
 
 def xyz_to_jab(element: Any, channels: list[Value]) -> list[Value]:

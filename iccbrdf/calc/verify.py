@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+from iccbrdf.calc.appearance import check_conditions
 from iccbrdf.calc.operators import OPERATORS, Element, Operand, stack_effect
 from iccbrdf.calc.program import MAX_NESTING, Block, Program, Step, nest, signature_name, written
 from iccbrdf.errors import LimitError, ProfileError, nearest
@@ -64,7 +65,10 @@ def verify(
 
 
 def verify_element(element: Element, *, where: str = "element") -> tuple[Checked, ...]:
-    """Check the calculators that a processing element is or holds; the results, none for most elements."""
+    """Check the calculators that a processing element is or holds; the results, none for most elements.
+
+    Viewing conditions of the appearance model are checked too.
+    """
     return _verify_element(element, where, 0, {})
 
 
@@ -74,6 +78,8 @@ _Known: TypeAlias = dict[int, tuple[Checked, ...]]
 
 def _verify_element(element: Element, where: str, level: int, known: _Known) -> tuple[Checked, ...]:
     if id(element) not in known:
+        if element.signature in ("XtoJ", "JtoX"):
+            check_conditions(element, where)
         known[id(element)] = tuple(
             _verify(c.program, c.inputs, c.outputs, c.elements, where, level, known)
             for c in _calculators(element, where)

@@ -45,11 +45,10 @@ class _Appearance(Record):
     inputs = outputs = 3
 
     def check(self) -> None:
-        numbers = (*self.white, self.luminance, self.background, self.surround)
-        if not all(math.isfinite(n) and n > 0 for n in numbers):
-            raise ValueError(f"found white, luminance, background, surround {numbers}, expected them above 0")
-        if not (math.isfinite(self.induction) and math.isfinite(self.adaptation)):
-            raise ValueError(f"found factors {self.induction}, {self.adaptation}, expected finite ones")
+        fields = ("luminance", "background", "surround", "induction", "adaptation")
+        numbers = (*self.white, *(getattr(self, name) for name in fields))
+        if not all(map(math.isfinite, numbers)):
+            raise ValueError(f"found {numbers}, expected finite ones")
 
 
 @ELEMENTS.add("XtoJ")

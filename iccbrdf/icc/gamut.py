@@ -33,7 +33,7 @@ class _Triangles(FieldType):
 class GamutBoundary(Record):
     """gamutBoundaryDescType: a surface of triangles around the colours that a device can make.
 
-    triangles : shape (T, 3), numbers of vertices
+    triangles : shape (T, 3), numbers of vertices; some writers count these from 1
     pcs : shape (V, PCS channels), the vertices in the connection space
     device : shape (V, device channels), the same as device values; no columns where they are not told
     """
@@ -62,7 +62,3 @@ class GamutBoundary(Record):
             )
         if self.triangles.ndim != 2 or self.triangles.shape[1] != 3:
             raise ValueError(f"triangles: found shape {self.triangles.shape}, expected (count, 3)")
-        if self.triangles.size and int(self.triangles.max()) >= len(self.pcs):
-            raise ValueError(
-                f"triangles: found vertex {self.triangles.max()}, expected less than {len(self.pcs)}"
-            )
