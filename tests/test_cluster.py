@@ -197,6 +197,7 @@ def test_an_image_pickles_as_its_path_and_meaning(image, tmp_path, monkeypatch):
     [
         (["-o", "out.png"], "a cluster writes one TIFF"),
         (["-o", "out.tif", "-o", "more.tif"], "a cluster writes one TIFF"),
+        (["-o", "out.tif", "--compression", "zstd"], "a cluster writes no compressed TIFF"),
         (["-o", "out.tif", "--normals", "map.png"], "leave --normals and --height out"),
     ],
 )

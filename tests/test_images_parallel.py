@@ -83,11 +83,16 @@ def small_blocks(monkeypatch):
     monkeypatch.setattr(tiff_reader, "BLOCK_SAMPLES", BLOCK * CHANNELS)
 
 
-def run(image, target, transform=None, workers=1, overwrite=False, outputs=()):
+def run(image, target, transform=None, workers=1, overwrite=False):
     with open_tiff(image) as source:
-        targets = [Output(target), *outputs]
         return pipeline.run(
-            source, transform or Sums(), Last, targets, overwrite=overwrite, label="", workers=workers
+            source,
+            transform or Sums(),
+            Last,
+            [Output(target)],
+            overwrite=overwrite,
+            label="",
+            workers=workers,
         )
 
 
@@ -332,6 +337,42 @@ def test_blocks_under_way_are_bounded(tmp_path, monkeypatch):
         run(image, tmp_path / "out.tif", workers=workers, overwrite=True)
         assert most <= 2 * workers + 1
         assert under_way == 0
+
+
+def test_large_segments_are_not_decoded_at_the_same_time(tmp_path, monkeypatch):
+    image = write(tmp_path / "image.tif", stored(), compression="deflate", rowsperstrip=20)
+    monkeypatch.setattr(pipeline, "SAMPLES_AT_A_TIME", 2 * 20 * WIDTH * CHANNELS - 1)
+    together, most, lock = 0, 0, threading.Lock()
+    read = tiff_reader.TiffSource.read
+
+    def counted_read(self, place):
+        nonlocal together, most
+        with lock:
+            together += 1
+            most = max(most, together)
+        time.sleep(0.002)
+        block = read(self, place)
+        with lock:
+            together -= 1
+        return block
+
+    monkeypatch.setattr(tiff_reader.TiffSource, "read", counted_read)
+    run(image, tmp_path / "out.tif", workers=4)
+    assert most == 1
+
+
+@pytest.mark.parametrize("compression", ["deflate", "zstd"])
+def test_compressed_results(tmp_path, compression):
+    image = write(tmp_path / "image.tif", stored())
+    for workers in (1, 3):
+        target = tmp_path / f"{workers}.tif"
+        with open_tiff(image) as source:
+            outputs = [Output(target, compression=compression)]
+            pipeline.run(source, Sums(), Last, outputs, overwrite=False, label="", workers=workers)
+        assert np.array_equal(tifffile.imread(target), Sums()(stored()))
+        with tifffile.TiffFile(target) as file:
+            assert compression in file.pages[0].compression.name.lower()
+    assert (tmp_path / "1.tif").read_bytes() == (tmp_path / "3.tif").read_bytes()
 
 
 def test_blocks_of_many_channels_have_fewer_pixels(tmp_path):

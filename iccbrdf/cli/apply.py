@@ -84,6 +84,8 @@ def read_relief(
               help="Distance of the height map's pixels on the print, in the same unit.")  # fmt: skip
 @click.option("--dtype", type=click.Choice(("float32", "uint16")), default="float32", show_default=True,
               help="Samples of a TIFF; uint16 holds XYZ as the ICC's u1.15.")  # fmt: skip
+@click.option("--compression", type=click.Choice(("none", "deflate", "zstd")), default="none",
+              show_default=True, help="Of a TIFF.")  # fmt: skip
 @click.option("--embed", is_flag=True, help="Embed the last profile in a TIFF.")
 @click.option("--exposure", type=click.FloatRange(min=0, min_open=True), default=1.0,
               show_default=True, help="Factor on the XYZ of a PNG.")  # fmt: skip
@@ -115,6 +117,7 @@ def command(
     relief: float | None,
     pitch: float | None,
     dtype: Literal["float32", "uint16"],
+    compression: Literal["none", "deflate", "zstd"],
     embed: bool,
     exposure: float,
     depth: str,
@@ -136,7 +139,10 @@ def command(
     if to_image is not None:
         chain.append(to_image)
     embedded = last.to_bytes() if embed else None
-    targets = [Output(path, dtype, embedded, exposure, 16 if depth == "16" else 8) for path in outputs]
+    packing = None if compression == "none" else compression
+    targets = [
+        Output(path, dtype, embedded, packing, exposure, 16 if depth == "16" else 8) for path in outputs
+    ]
     check_outputs(targets, overwrite=force)
     variables = environment(light, view, env)
     if cluster is not None and (normal_map or height_map):

@@ -24,6 +24,9 @@ from iccbrdf.images.checks import not_finite, steeper
 TIFF_SUFFIXES = (".tif", ".tiff")
 PNG_SUFFIX = ".png"
 
+SAMPLES_AT_A_TIME = 1 << 26
+"""Blocks that are read at a time hold no more samples, unless one alone does, as a compressed segment may."""
+
 _COLORIMETRIC = (("X", "Y", "Z"), ("L*", "a*", "b*"))
 
 
@@ -36,6 +39,8 @@ class Output:
     """Sample type of a TIFF: float32, or uint16 for XYZ in u1.15."""
     profile: bytes | None = None
     """Profile to embed in a TIFF."""
+    compression: Literal["deflate", "zstd"] | None = None
+    """Of a TIFF."""
     exposure: float = 1.0
     """Factor on the XYZ of a PNG."""
     depth: Literal[8, 16] = 8
@@ -113,8 +118,13 @@ def run(
             )
         to_display = standard_XYZ(last)
     done = Done()
+    first = next(iter(source.places()))
+    samples = first.height * first.width * source.channels
+    workers = max(1, min(workers, SAMPLES_AT_A_TIME // samples))
     with ExitStack() as stack:
-        sinks = [stack.enter_context(_open(output, source, transform, overwrite)) for output in outputs]
+        sinks = [
+            stack.enter_context(_open(output, source, transform, overwrite, workers)) for output in outputs
+        ]
         advance = stack.enter_context(_progress(source, label))
 
         def work(place: Place) -> _Worked:
@@ -165,6 +175,8 @@ def run_on_cluster(
     if len(outputs) != 1 or outputs[0].is_png:
         raise UsageError("a cluster writes one TIFF; make pictures and copies of it")
     (output,) = outputs
+    if output.compression:
+        raise UsageError("a cluster writes no compressed TIFF, as nobody knows before where a block belongs")
     met = apply(
         transform,
         source,
@@ -179,7 +191,7 @@ def run_on_cluster(
     return Done(written, met.not_finite_in, met.not_finite_out, met.beyond_slopes)
 
 
-def _open(output: Output, source: ImageSource, transform: Transform, overwrite: bool) -> Any:
+def _open(output: Output, source: ImageSource, transform: Transform, overwrite: bool, workers: int) -> Any:
     if output.is_png:
         # Imported late, as codecs and displays are not needed for a TIFF.
         from iccbrdf.images.display import create_png
@@ -200,7 +212,9 @@ def _open(output: Output, source: ImageSource, transform: Transform, overwrite: 
         samples=transform.samples_out,
         dtype=output.dtype,
         profile=output.profile,
+        compression=output.compression,
         overwrite=overwrite,
+        workers=workers,
     )
 
 
