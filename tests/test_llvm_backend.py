@@ -15,7 +15,7 @@ from llvm_examples import POSSIBLE, run, ulps_apart
 from iccbrdf import read_profile
 from iccbrdf.calc.elements import apply
 from iccbrdf.calc.graph import LOGIC, TRUTHS, Graph
-from iccbrdf.calc.llvm import codegen, compile_llvm, target, wide
+from iccbrdf.calc.llvm import codegen, compile_llvm, engine, target, wide
 from iccbrdf.calc.operators import OPERATORS
 from iccbrdf.calc.program import parse
 from iccbrdf.calc.schedule import Branch, Schedule, computed, schedule, uniform_values
@@ -174,6 +174,16 @@ def test_long_programs(terms, called):
     assert ("call fastcc" in codegen.assemble(plan, target.host()).text) == called
     pixels = np.random.default_rng(2).uniform(0.1, 1, (100, 2)).astype(np.float32)
     np.testing.assert_allclose(run(plan, pixels), walk(plan, pixels), rtol=1e-4)
+
+
+@widths
+def test_code_made_with_less_care(width, monkeypatch, rounded_once):
+    monkeypatch.setattr(engine, "LARGE", 0)
+    for seed in range(0, 40, 3):
+        plan = scheduled(calculator(random_program(seed, 60), INPUTS, OUTPUTS))
+        if not any(node.op == "solve" for node in computed(plan.body)):
+            pixels = hard_pixels(40, INPUTS, np.float32, seed)
+            assert same_bits(run(plan, pixels, width=width), walk(plan, pixels)), seed
 
 
 # Branches ----------------------------------------------------------------------------------------------

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from iccbrdf.calc.llvm.assembler import Value
 
 _LOG2_E = 1 / math.log(2)
@@ -188,8 +190,6 @@ def angle(x: Value, y: Value) -> Value:
 
 def _less(whole: float, part: Value) -> Value:
     """whole - part, where `whole` is no float32 number."""
-    import numpy as np
-
     high = float(np.float32(whole))
     return high - (part - (whole - high))
 
