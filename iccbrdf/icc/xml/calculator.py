@@ -78,7 +78,7 @@ def _program(main: Node, text: str) -> Program:
     try:
         return parse(text)
     except (LimitError, ProfileError) as error:
-        raise main.error(str(error), kind=type(error)) from None
+        raise main.error(str(error).removeprefix("program text, "), kind=type(error)) from None
 
 
 class _Reading:
@@ -121,8 +121,8 @@ class _Reading:
         position = self._number(node, "Position", -1)
         if imported and position > 0:
             raise node.error("Position: expected none for an imported variable")
-        if position + size > SLOTS:
-            raise node.error(f"variable {name!r}: found {position + size} slots, expected up to {SLOTS}")
+        if max(position, 0) + size > SLOTS:
+            raise node.error(f"variable {name!r}: found {max(position, 0) + size} slots, expected up to {SLOTS}")
         self.declared.variables[name] = Span(position, size, members)
 
     def _macros(self, node: Node, imported: bool) -> None:

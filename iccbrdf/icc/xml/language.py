@@ -20,8 +20,8 @@ from iccbrdf.icc.source_tag import SLOTS, CalculatorSource
 from iccbrdf.icc.xml.node import Node
 from iccbrdf.icc.xml.values import Codec
 
-MAX_TOKENS = 1 << 18
-"""Words that the macros of a main function stand for: small files could stand for endless ones."""
+MAX_WORDS = 1 << 16
+"""Words that the macros of a document stand for in all: small files could stand for endless ones."""
 MAX_CALLS = 64
 """Macros that call one another."""
 
@@ -37,6 +37,7 @@ _SIZED = re.compile(rf"({_NAME})(?:[\[(](\d{{1,5}})[\])])?")
 
 _BARE = re.compile(r"(?<![^\s{}])(in|out|tget|tput|tsav)(?=\s*\}|\s+[^\s(\[{]|\s*$)")
 """What has no argument, which then is 0."""
+_NEGATIVE_NAN = re.compile(r"(?<![^\s{}])-nan(?![^\s{}])")
 _LOST = re.compile(r"(?<![^\s{}])rot[lr](?=\s*\}|\s+[^\s(\[]|\s*$)")
 
 _MEMORY = ("tget", "tput", "tsav")
@@ -157,7 +158,6 @@ class _Expansion:
         self.variables = declared.variables
         self.indices: dict[str, int] = {}
         self.next_slot = max((v.first + v.size for v in self.variables.values() if v.first >= 0), default=0)
-        self.tokens = 0
 
     def text(self, main: Node) -> str:
         place = _Place(main, main.line)
@@ -171,7 +171,7 @@ class _Expansion:
         if lost := _LOST.search(text):
             place = replace(place, line=place.line + text.count("\n", 0, lost.start()))
             main.document.warn(place.error(f"{lost[0]} has no arguments: the ICC's iccToXml leaves them out"))
-        return "\n" * (main.line - 1) + text
+        return "\n" * (main.line - 1) + _NEGATIVE_NAN.sub("data(ffc00000)", text)
 
     def _pieces(self, text: str, place: _Place, calls: tuple[str, ...]) -> Iterator[str | _Local]:
         for token in _TOKEN.finditer(text):
@@ -182,9 +182,10 @@ class _Expansion:
                 continue
             if token["comment"]:
                 continue
-            self.tokens += place.macro is not None
-            if self.tokens > MAX_TOKENS:
-                raise place.error(f"macros stand for more than {MAX_TOKENS} words", LimitError)
+            document = place.node.document
+            document.words += place.macro is not None
+            if document.words > MAX_WORDS:
+                raise place.error(f"macros stand for more than {MAX_WORDS} words", LimitError)
             word = token["word"]
             if call := _CALL.fullmatch(word):
                 yield from self._macro(call[1] or call[2], place, calls)

@@ -41,6 +41,8 @@ class Document:
     def __init__(self, folder: Path | None, *, strict: bool = False) -> None:
         self.folder = folder
         self.strict = strict
+        self.words = 0
+        """Words that macros have stood for so far."""
         self._left = MAX_BYTES
         self._warnings = 0
 
