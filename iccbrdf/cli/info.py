@@ -25,7 +25,7 @@ Examples:
     iccbrdf info -p mid.icc -p mvis.icc
 """
 
-_PACKAGES = ("iccbrdf", "numpy", "llvmlite", "dask", "zarr", "OpenEXR", "tifffile", "imagecodecs")
+_PACKAGES = ("iccbrdf", "numpy", "llvmlite", "dask", "OpenEXR", "tifffile", "imagecodecs")
 
 
 @click.command("info", epilog=EPILOG)

@@ -28,12 +28,12 @@ Examples:
     iccbrdf proof job.tif --printer FOGRA39.icc --height relief.png \\
       --pixel-pitch 0.1mm --primaries primaries.json -o out
   Raking light from four sides, a contact sheet, and the light going round:
-    iccbrdf proof job.tif --primaries primaries.json -o out --sheet \\
-      --light left=75,180 --light right=75,0 --light top=75,90 --light bottom=75,270 --sweep 60,0:60,360
+    iccbrdf proof job.tif --primaries primaries.json -o out --sheet --sweep 60,0:60,360 \\
+      --light left=75,180 --light right=75,0 --light top=75,90 --light bottom=75,270
   Everything in a file, of which each key is an option's name; many of them:
     iccbrdf proof job.toml
     iccbrdf proof monday/*.toml --json
-\b
+
 A job that was done before from the same inputs is skipped; --force does it again.
 """
 
