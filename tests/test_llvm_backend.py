@@ -79,7 +79,7 @@ def test_random_programs(first, rounded_once):
 
 EXACT = (
     "add", "sub", "mul", "div", "mod", "vmin", "vmax", "neg", "abs", "sqrt", "flor", "trnc", "rond", "sign",
-    "lt", "le", "eq", "gt", "rnum", "not", "vand", "vor", "vxor", "select", "select",
+    "lt", "le", "ge", "gt", "rnum", "not", "vand", "vor", "vxor", "select", "select",
 )  # fmt: skip
 DRAWN_NODES = st.tuples(st.sampled_from(EXACT), *[st.integers(0, 1000)] * 3)
 
@@ -256,7 +256,7 @@ def test_a_condition_of_the_whole_run(env, rounded_once):
 
 @widths
 @dtypes
-@pytest.mark.parametrize("shape", [(2, 1), (5, 3), (3, 4, 2), (4, 2, 3, 4), (2, 3, 2, 3, 9), (*(2,) * 8, 17)])
+@pytest.mark.parametrize("shape", [(2, 1), (5, 3), (3, 4, 2), (4, 2, 3, 4), (2, 3, 2, 3, 9), (*(2,) * 6, 17)])
 def test_look_up_tables(shape, dtype, width):
     rng = np.random.default_rng(3)
     table = Clut(rng.normal(size=shape).astype(np.float32))
@@ -320,9 +320,9 @@ def test_curves(name, dtype):
 def test_what_is_not_supported_is_named():
     with pytest.raises(UnsupportedError, match="solve"):
         compile_llvm(plan_of("in[0,2] in[0,2] in[0,2] solv(1,1) out[0,3]", 2, 3))
-    large = Clut(np.zeros((2,) * 9 + (1,), np.float32))
+    large = Clut(np.zeros((2,) * 9 + (9,), np.float32))
     with pytest.raises(UnsupportedError, match="clut of 9 inputs"):
-        compile_llvm(plan_of("in[0,9] clut(0) out[0]", 9, 1, elements=[large]))
+        compile_llvm(plan_of("in[0,9] clut(0) out[0,9]", 9, 9, elements=[large]))
     graph = Graph(dtype=np.float32)
     graph.outputs = (graph.add("curve", [graph.input(0)], large),)
     with pytest.raises(UnsupportedError, match="curve 'clut'"):

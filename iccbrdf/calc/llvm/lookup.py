@@ -20,8 +20,9 @@ from iccbrdf.calc.llvm.rows import load_channels
 from iccbrdf.calc.llvm.wide import wide_exp, wide_log, wide_log10, wide_power
 from iccbrdf.errors import UnsupportedError
 
-MOST_INPUTS, MOST_OUTPUTS = 8, 64
-"""Of a look-up table: the code grows with 2^inputs outputs."""
+MOST_READ = 4096
+"""Numbers of a look-up table that are read for a pixel (2^inputs corners times the outputs): code grows with
+them."""
 
 
 class Tables:
@@ -62,10 +63,10 @@ def look_up(tables: Tables, element: Any, channels: Sequence[Value]) -> list[Val
     """
     code, type = channels[0].code, channels[0].type
     *grid, outputs = element.table.shape
-    if len(grid) > MOST_INPUTS or outputs > MOST_OUTPUTS:
+    if 2 ** len(grid) * outputs > MOST_READ:
         raise UnsupportedError(
-            f"clut of {len(grid)} inputs and {outputs} outputs, at most {MOST_INPUTS} and {MOST_OUTPUTS} "
-            "with LLVM"
+            f"clut of {len(grid)} inputs and {outputs} outputs: {2 ** len(grid) * outputs} numbers are read "
+            f"for a pixel, at most {MOST_READ} by LLVM"
         )
     dtype = np.float32 if type.element == "float" else np.float64
     base = tables.base(element.table.astype(dtype))
