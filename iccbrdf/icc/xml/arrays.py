@@ -50,6 +50,16 @@ class Wavelengths(Part):
         out.set("steps", str(self.count(record)))
 
 
+def spectral_range(name: str, field: str, steps: str) -> Inside:
+    """Wavelengths in an element of their own, left out where they are zeros."""
+    return Inside(
+        name,
+        Inside("Wavelengths", Wavelengths(field, steps, lambda record: int(getattr(record, steps)))),
+        default=lambda seen: {field: (0.0, 0.0), steps: 0},
+        present=lambda record: any(getattr(record, field)) or getattr(record, steps) > 0,
+    )
+
+
 class Grid(Part):
     """The grid points of each input, or one number that holds for all of them."""
 

@@ -121,8 +121,9 @@ class _Reading:
         position = self._number(node, "Position", -1)
         if imported and position > 0:
             raise node.error("Position: expected none for an imported variable")
-        if max(position, 0) + size > SLOTS:
-            raise node.error(f"variable {name!r}: found {max(position, 0) + size} slots, expected up to {SLOTS}")
+        end = max(position, 0) + size
+        if end > SLOTS:
+            raise node.error(f"variable {name!r}: found {end} slots, expected up to {SLOTS}")
         self.declared.variables[name] = Span(position, size, members)
 
     def _macros(self, node: Node, imported: bool) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from iccbrdf.errors import nearest
 from iccbrdf.icc.header import Header
-from iccbrdf.icc.xml.arrays import Triple, Wavelengths
+from iccbrdf.icc.xml.arrays import Triple, spectral_range
 from iccbrdf.icc.xml.forms import Content, Form, Inside, Part, Seen, optional
 from iccbrdf.icc.xml.node import Node, Target
 from iccbrdf.icc.xml.tags import DATE
@@ -99,16 +99,6 @@ class _Bits(Part):
             out.set(self.rest, f"{value:0{self.digits}x}")
 
 
-def _range(name: str, prefix: str) -> Inside:
-    span, steps = f"{prefix}_range", f"{prefix}_steps"
-    return Inside(
-        name,
-        Inside("Wavelengths", Wavelengths(span, steps, lambda record: getattr(record, steps))),
-        default=lambda seen: {span: (0.0, 0.0), steps: 0},
-        present=lambda record: any(getattr(record, span)) or getattr(record, steps) > 0,
-    )
-
-
 def _present(name: str, field: str, codec: Codec, default: Any = "") -> Inside:
     """A value that is written always and may be missing."""
     return Inside(name, Content(field, codec), default=lambda seen: {field: default})
@@ -167,8 +157,8 @@ HEADER = Form(
     _present("ProfileCreator", "creator", SIGNATURE),
     optional("ProfileID", Content("profile_id", Codec(lambda text: bytes(16), HEX.write)), bytes(16)),
     optional("SpectralPCS", Content("spectral_pcs", COLOUR), ""),
-    _range("SpectralRange", "spectral"),
-    _range("BiSpectralRange", "bispectral"),
+    spectral_range("SpectralRange", "spectral_range", "spectral_steps"),
+    spectral_range("BiSpectralRange", "bispectral_range", "bispectral_steps"),
     optional("MCS", Content("mcs", COLOUR), ""),
     optional("Reserved", Content("reserved", HEX), bytes(4)),
     signature="",

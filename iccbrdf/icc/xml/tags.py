@@ -28,7 +28,7 @@ from iccbrdf.icc.tags import (
     VideoCodePoints,
     ViewingConditions,
 )
-from iccbrdf.icc.xml.arrays import NUMBER_FORMS, Triple, Wavelengths
+from iccbrdf.icc.xml.arrays import NUMBER_FORMS, Triple, Wavelengths, spectral_range
 from iccbrdf.icc.xml.composite import TYPE_FORMS
 from iccbrdf.icc.xml.elements import CHANNELS, CURVE_FORMS, ELEMENT_FORMS
 from iccbrdf.icc.xml.forms import (
@@ -280,16 +280,6 @@ def _spectral(name: str, prefix: str, field: str, rows: int) -> Inside:
     )
 
 
-def _range(name: str, prefix: str) -> Inside:
-    span, steps = f"{prefix}wavelengths", f"{prefix}steps"
-    return Inside(
-        name,
-        Inside("Wavelengths", Wavelengths(span, steps, lambda record: getattr(record, steps))),
-        default=lambda seen: {span: (0.0, 0.0), steps: 0},
-        present=lambda record: any(getattr(record, span)) or getattr(record, steps) > 0,
-    )
-
-
 TYPE_FORMS.add(
     *NUMBER_FORMS.by_signature.values(),
     Form(
@@ -332,8 +322,8 @@ TYPE_FORMS.add(
         "spectralDataInfoType",
         SpectralDataInfo,
         Inside("SpectralSpace", Content("space", COLOUR)),
-        _range("SpectralRange", ""),
-        _range("BiSpectralRange", "bispectral_"),
+        spectral_range("SpectralRange", "wavelengths", "steps"),
+        spectral_range("BiSpectralRange", "bispectral_wavelengths", "bispectral_steps"),
     ),
 )
 
