@@ -4,11 +4,10 @@ import numpy as np
 
 from iccbrdf.calc import elements
 from iccbrdf.calc.exact_passes import EXACT_PASSES
-from iccbrdf.calc.graph import Graph, is_truth
+from iccbrdf.calc.graph import Graph, is_truth, meaning
 from iccbrdf.calc.interpreter import run
 from iccbrdf.calc.lift import lift_element
 from iccbrdf.calc.meanings import solve
-from iccbrdf.calc.operators import OPERATORS
 from iccbrdf.calc.passes import optimise
 from iccbrdf.calc.schedule import Branch, schedule, uniform_values
 from iccbrdf.icc import Calculator
@@ -84,7 +83,7 @@ def walk(plan, pixels, env=None):
             return elements.apply(node.detail, [number(argument) for argument in arguments], dtype=dtype)
         if node.op == "solve":
             return solve([number(argument) for argument in arguments], *(n - 1 for n in node.detail))
-        result = OPERATORS[node.op].function(*map(number, arguments))
+        result = meaning(node.op)(*map(number, arguments))
         return result >= 0.5 if is_truth(node) else result
 
     with np.errstate(all="ignore"):

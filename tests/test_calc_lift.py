@@ -14,11 +14,12 @@ from graph_examples import (
 )
 
 from iccbrdf import read_profile
+from iccbrdf.calc.backends import COMPILERS
 from iccbrdf.calc.exact_passes import EXACT_PASSES
 from iccbrdf.calc.graph import Graph, check
 from iccbrdf.calc.passes import optimise
 from iccbrdf.calc.program import parse
-from iccbrdf.calc.schedule import Branch, computed
+from iccbrdf.calc.schedule import Branch, computed, uniform_values
 from iccbrdf.errors import UnsupportedError
 from iccbrdf.icc import Clut, CurveSet, Matrix, SampledCalculatorCurve, TintArray
 from iccbrdf.resources import folder
@@ -163,3 +164,21 @@ def test_what_is_nearly_the_same_is_not_simplified(op, constant):
     graph = Graph(dtype=np.float32)
     graph.outputs = (graph.add(op, [graph.input(0), graph.const(constant)]),)
     assert optimise(graph, EXACT_PASSES)[0].outputs[0].op == op
+
+
+@pytest.mark.parametrize("env", [{"litX": float("nan"), "a": 0.5}, {"litX": 1.0, "a": 2.0}])
+def test_equality_and_powers_with_run_time_variables(env):
+    """NaN equals NaN in `eq`; C's pow gives 0 and infinity for -0 and -infinity to the power 0.5."""
+    text = "in(0) env(litX) pop eq out(0) in(0) env(litX) pop neq out(1) in(0) env(a) pop pow out(2)"
+    text += " in(0) 0.5 pow out(3)"
+    element = calculator(parse(text), 1, 4)
+    pixels = np.array([[np.nan], [1], [-0.0], [-np.inf], [4]], np.float32)
+    expected = interpreted(element, pixels, env)
+    assert same_bits(expected[2:, 3], np.float32([0, np.inf, 2]))
+    assert expected[0, 0] == np.isnan(env["litX"])
+    plan = scheduled(element)
+    assert same_bits(walk(plan, pixels, env), expected)
+    for compiler in COMPILERS.values():
+        out = np.empty_like(expected)
+        compiler(plan).run(pixels, out, uniform_values(plan, env))
+        assert same_bits(out, expected)

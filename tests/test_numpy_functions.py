@@ -7,7 +7,7 @@ import pytest
 from graph_examples import same_bits
 
 from iccbrdf.calc import numpy_functions
-from iccbrdf.calc.graph import LOGIC, Graph, is_truth
+from iccbrdf.calc.graph import LOGIC, Graph, is_truth, meaning
 from iccbrdf.calc.numpy_backend import compile_numpy
 from iccbrdf.calc.operators import OPERATORS
 from iccbrdf.calc.schedule import schedule
@@ -69,7 +69,7 @@ def computed(op, columns, dtype):
 
 def wanted(op, columns, dtype):
     with np.errstate(all="ignore"):
-        return np.asarray(OPERATORS[op].function(*(np.asarray(column, dtype)[()] for column in columns)))
+        return np.asarray(meaning(op)(*(np.asarray(column, dtype)[()] for column in columns)))
 
 
 def ordered(values):

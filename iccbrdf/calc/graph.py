@@ -32,8 +32,8 @@ working type, operators that others can express are expressed by them, and there
 | tint     | the element   | a tint array's outputs, read by `pick`                             |
 | solve    | rows, columns | the unknowns and the flag of `solv`, read by `pick`                |
 
-There the operators of TRUTHS take and give conditions, and a select's condition is one.  A condition that
-stands where a number is wanted is 1 or 0.
+There the operators of TRUTHS take and give conditions, and a select's condition is one; `eq` and `neq` are
+those of IEEE.  A condition that stands where a number is wanted is 1 or 0.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ from typing import Any
 
 import numpy as np
 
+from iccbrdf.calc.meanings import compare
 from iccbrdf.calc.operators import OPERATORS, Kind
 from iccbrdf.errors import IccBrdfError
 
@@ -161,6 +162,21 @@ def is_elementwise(op: str) -> bool:
     """Whether the op works on each component alone and gives one vector."""
     row = OPERATORS.get(op)
     return row is not None and row.kind is Kind.EACH and gives(op) == 1
+
+
+def meaning(op: str) -> Callable[..., Any] | None:
+    """
+    What computes an operator of the graph, None where nothing does.
+
+    As the calculator's, but that NaN equals nothing: lifting makes the calculator's `eq` of this one.
+    """
+    if op in _IEEE:
+        return _IEEE[op]
+    row = OPERATORS.get(op)
+    return row.function if row else None
+
+
+_IEEE = {"eq": compare(np.equal), "neq": compare(np.not_equal)}
 
 
 def takes(op: str) -> int:
@@ -287,14 +303,14 @@ def evaluate(
         return (*arguments[0][detail:], *arguments[0][:detail])
     if op == "select":
         return tuple(arguments[1] if arguments[0][0] >= 0.5 else arguments[2])
-    row = OPERATORS.get(op)
-    if row is None or row.function is None:
+    row, function = OPERATORS.get(op), meaning(op)
+    if row is None or function is None:
         return None
     planes = [[dtype(value) for value in argument] for argument in arguments]
     with np.errstate(all="ignore"):
         if row.kind is Kind.REDUCE:
-            return (float(row.function(planes[0])),)
-        results = [row.function(*values) for values in zip(*planes, strict=True)]
+            return (float(function(planes[0])),)
+        results = [function(*values) for values in zip(*planes, strict=True)]
     if gives(op) > 1:
         return tuple(float(value) for plane in zip(*results, strict=True) for value in plane)
     return tuple(map(float, results))

@@ -140,6 +140,13 @@ def logical(test: Callable[[Value, Value], Value]) -> Callable[[Value, Value], V
 
 
 @in_double
+def power(a: Value, b: Value) -> Value:
+    """C's pow.  NumPy takes a root where the exponent is 0.5 for all pixels, which is -0 for -0, not 0."""
+    rooted = (b == 0.5) & ((a == 0) | (a == -np.inf))
+    return where(rooted, np.abs(a), np.power(a, b))
+
+
+@in_double
 def angle(x: Value, y: Value) -> Value:
     """In radians; the abscissa comes first."""
     result: Value = np.arctan2(y, x)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from iccbrdf.calc.buffers import Code, Function, Operand, Place, View
+from iccbrdf.calc.buffers import Code, Function, Kind, Operand, Place, View
 from iccbrdf.calc.meanings import INT_MIN
 
 NUMBERS: Mapping[str, Function] = {
@@ -145,6 +145,9 @@ _POWERS = range(3, 8)
 
 def _power(code: Code, a: Operand, b: Operand) -> Operand:
     if isinstance(b, Place) or code.dtype is not np.float32 or b not in _POWERS:
+        if b == 0.5 or (isinstance(b, Place) and b.register.kind is Kind.ARGUMENT):
+            # NumPy takes a root for the one exponent 0.5, which is -0 for -0, but not for a plane of them.
+            b = code.do(np.positive, b)
         return code.do(np.power, a, b)
     exponent = int(b)
     result = None

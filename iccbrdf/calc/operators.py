@@ -313,7 +313,7 @@ _ROWS = (
     _each("mul", 2, 1, np.multiply, "a b"),
     _each("div", 2, 1, np.divide, "a / b"),
     _each("mod", 2, 1, m.modulo, "remainder of a / b with the sign of a; a where b is 0"),
-    _each("pow", 2, 1, _WIDE(np.power), "a^b as C's pow"),
+    _each("pow", 2, 1, m.power, "a^b as C's pow"),
     _each("atn2", 2, 1, m.angle, "angle of the point x, y, in this order; radians"),
     _each("ctop", 2, 2, m.cartesian_to_polar, "x, y to radius and angle in degrees, 0 to 360"),
     _each("ptoc", 2, 2, m.polar_to_cartesian, "radius, angle in degrees to x, y"),
@@ -330,7 +330,7 @@ _ROWS = (
     _each("vor", 2, 1, m.logical(np.logical_or), "1 if one is 0.5 or more, else 0"),
     _each("vxor", 2, 1, m.logical(np.logical_xor), "1 if exactly one is 0.5 or more, else 0"),
     # n values and one on top of them
-    _scalar("gama", _WIDE(np.power), "a^g for each a"),
+    _scalar("gama", m.power, "a^g for each a"),
     _scalar("sadd", np.add, "a + g for each a"),
     _scalar("ssub", np.subtract, "a - g for each a"),
     _scalar("smul", np.multiply, "a g for each a"),

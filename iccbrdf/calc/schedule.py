@@ -14,9 +14,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from iccbrdf.calc import elements
-from iccbrdf.calc.graph import Graph, Node, is_truth
+from iccbrdf.calc.graph import Graph, Node, is_truth, meaning
 from iccbrdf.calc.meanings import solve
-from iccbrdf.calc.operators import OPERATORS
 from iccbrdf.calc.program import signature
 
 Block: TypeAlias = "tuple[Node | Branch, ...]"
@@ -62,6 +61,11 @@ _COST = {
     "solve": 200, "pick": 0,
 }  # fmt: skip
 """Rough times in units of an addition, for the choice of branches alone."""
+
+
+def cost(node: Node) -> int:
+    """About how long a node takes, in units of an addition."""
+    return _COST.get(node.op, 1)
 
 
 def schedule(graph: Graph, channels: int) -> Schedule:
@@ -131,7 +135,7 @@ def _uniform(
     if node.op == "solve":
         rows, columns = node.detail
         return solve(values, rows - 1, columns - 1)
-    function = OPERATORS[node.op].function
+    function = meaning(node.op)
     if function is None:
         raise TypeError(f"{node.op} has no meaning of its own")
     return function(*values)
@@ -266,7 +270,7 @@ def _worthwhile(units: Sequence[_Unit], paths: Mapping[_Unit, _Path]) -> set[_Gr
     """The groups whose sides hold enough work to be branches."""
     work: dict[_Group, int] = {}
     for unit in units:
-        cost = _COST.get(unit.op, 1) if isinstance(unit, Node) else len(unit.selects)
+        units_cost = cost(unit) if isinstance(unit, Node) else len(unit.selects)
         for group, _ in paths[unit]:
-            work[group] = work.get(group, 0) + cost
-    return {group for group, cost in work.items() if cost >= LEAST_WORK}
+            work[group] = work.get(group, 0) + units_cost
+    return {group for group, total in work.items() if total >= LEAST_WORK}

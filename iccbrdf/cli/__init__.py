@@ -24,6 +24,8 @@ COMMANDS = {
     "dump": "Show what a profile holds.",
     "validate": "Check whether profiles are sound.",
     "diff": "Show what differs between two profiles.",
+    "xml": "Write a profile as XML.",
+    "icc": "Make a profile of XML.",
     "demo": "Softproof a relief print of a real landscape.",
     "info": "Show the back ends, and what would run a chain of profiles.",
 }
