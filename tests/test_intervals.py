@@ -1,20 +1,13 @@
 """Interval analysis: every value is where it is said to be, and what is sound is seen to be sound."""
 
-import math
-
 import numpy as np
 import pytest
 from calc_programs import INPUTS, OUTPUTS, random_program
 from graph_examples import calculator, lifted
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from iccbrdf.calc import elements
-from iccbrdf.calc.graph import is_truth
-from iccbrdf.calc.intervals import Arithmetic, Interval
 from iccbrdf.calc.meanings import solve
 from iccbrdf.calc.operators import OPERATORS
-from iccbrdf.calc.program import parse
 from iccbrdf.calc.ranges import analyse
 
 # Every value that a pixel needs --------------------------------------------------------------------------

@@ -17,13 +17,17 @@ of an integer; an output that is not finite by no fault of one operation."""
 
 @dataclass(frozen=True)
 class Hazard:
-    """`operand` of `node` reaches `range`; `guard`, the smallest remedy in words, may be empty."""
+    """`operand` of `node` reaches `range`; `remedy` has {} for it, and is empty where none is known."""
 
     kind: Kind
     node: Node
     operand: Node
     range: Interval
-    guard: str
+    remedy: str = ""
+
+    def guard(self, names: Sequence[str] = ()) -> str:
+        """The smallest change of the operand that makes the operation safe; `names` of input channels."""
+        return self.remedy.format(expression(self.operand, names))
 
 
 def hazard_of(a: Arithmetic, node: Node, arguments: Sequence[Interval], result: Interval) -> Hazard | None:
@@ -47,16 +51,14 @@ def hazard_of(a: Arithmetic, node: Node, arguments: Sequence[Interval], result: 
     if op in ("trnc", "rond") and not fits_integer(arguments[0]):
         return _hazard("overflow", node, arguments, 0, _held(arguments[0], 2147483520.0))
     if math.isinf(result.magnitude):
-        index, guard = _in_range(a, node, arguments)
-        return _hazard("overflow", node, arguments, index, guard)
+        return _hazard("overflow", node, arguments, *_in_range(a, node, arguments))
     return None
 
 
-def _hazard(kind: Kind, node: Node, arguments: Sequence[Interval], index: int, guard: str) -> Hazard:
+def _hazard(kind: Kind, node: Node, arguments: Sequence[Interval], index: int, remedy: str) -> Hazard:
     if node.op == "pick":
         node = node.arguments[0]
-    operand = node.arguments[index]
-    return Hazard(kind, node, operand, arguments[index], guard.format(expression(operand)))
+    return Hazard(kind, node, node.arguments[index], arguments[index], remedy)
 
 
 # Guards ------------------------------------------------------------------------------------------------
@@ -136,19 +138,19 @@ _INFIX = {
 _NAMES = {"vmin": "min", "vmax": "max", "flor": "floor", "rond": "round", "trnc": "trunc", "atn2": "atan2"}
 
 
-def expression(node: Node, depth: int = 3) -> str:
-    """A node as a formula of its operands and theirs, `depth` levels deep."""
+def expression(node: Node, names: Sequence[str] = (), depth: int = 3) -> str:
+    """A node as a formula of its operands and theirs, `depth` levels deep; `names` are those of inputs."""
     if node.op == "const":
         return f"{node.detail[0]:.6g}"
     if node.op == "input":
-        return f"in[{node.detail}]"
+        return names[node.detail] if node.detail < len(names) else f"in[{node.detail}]"
     if node.op in ("variable", "defined"):
         return node.detail if node.op == "variable" else f"defined({node.detail})"
     if node.op == "pick":
-        return f"{expression(node.arguments[0], depth)}[{node.detail}]"
+        return f"{expression(node.arguments[0], names, depth)}[{node.detail}]"
     if depth == 0:
         return "..."
-    parts = [expression(argument, depth - 1) for argument in node.arguments[:4]]
+    parts = [expression(argument, names, depth - 1) for argument in node.arguments[:4]]
     if len(node.arguments) > 4:
         parts.append("...")
     if node.op in _INFIX:

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import Any
+from typing import Any, TypeAlias
 
 from iccbrdf.calc.elements import calculator_samples
 from iccbrdf.calc.graph import LOGIC, Graph, Node, is_truth
@@ -31,8 +31,17 @@ MAX_MOVES = 1 << 24
 """Values moved while lifting: short programs can shuffle a deep stack for hours."""
 
 
+Origin: TypeAlias = "tuple[Any, int | None]"
+"""A processing element; of a calculator with the number of an operation."""
+
+
 def lift_element(
-    graph: Graph, element: Any, channels: Sequence[Node], *, finite_inputs: bool = False
+    graph: Graph,
+    element: Any,
+    channels: Sequence[Node],
+    *,
+    finite_inputs: bool = False,
+    origins: dict[Node, Origin] | None = None,
 ) -> list[Node]:
     """
     The nodes of a processing element's outputs.
@@ -47,13 +56,19 @@ def lift_element(
         A node for each input.
     finite_inputs
         Whether the graph's `input` channels may be taken to be finite: 0 times one of them is 0 then.
+    origins
+        Takes for every new node what first asked for it.
 
     Raises
     ------
     UnsupportedError
         The element is of a kind that only the interpreter runs, or its graph would be too large.
     """
-    return _Lift(graph, finite_inputs).element(element, channels)
+    lift = _Lift(graph, finite_inputs, origins)
+    first = len(graph.nodes)
+    results = lift.element(element, channels)
+    lift.mark(first, element, None)
+    return results
 
 
 @dataclass
@@ -62,6 +77,7 @@ class _Lift:
 
     graph: Graph
     finite_inputs: bool
+    origins: dict[Node, Origin] | None
     moves: int = 0
 
     def element(self, element: Any, channels: Sequence[Node]) -> list[Node]:
@@ -87,6 +103,12 @@ class _Lift:
         """All components of a node that gives several."""
         node = self.graph.add(op, arguments, detail)
         return [self.graph.pick(node, i) for i in range(node.width)]
+
+    def mark(self, first: int, element: Any, position: int | None) -> None:
+        """Note where the nodes from number `first` on come from, unless that is known more closely."""
+        if self.origins is not None:
+            for node in self.graph.nodes[first:]:
+                self.origins.setdefault(node, (element, position))
 
     def count(self, moved: int) -> None:
         """Account for values moved and nodes made."""
@@ -161,7 +183,7 @@ def _tint(lift: _Lift, element: Any, channels: Sequence[Node]) -> list[Node]:
 
 def _calculator(lift: _Lift, element: Any, channels: Sequence[Node]) -> list[Node]:
     zero = lift.number(0.0)
-    machine = _Machine(lift, element.elements, channels, [], [zero] * element.outputs, {}, zero)
+    machine = _Machine(lift, element, channels, [], [zero] * element.outputs, {}, zero)
     _execute(nest(element.program), machine)
     return machine.outputs
 
@@ -184,7 +206,7 @@ class _Machine:
     """As the interpreter's: what the operators that move values see of it is the same."""
 
     lift: _Lift
-    elements: Sequence[Element]
+    calculator: Any
     channels: Sequence[Any]
     stack: list[Any]
     outputs: list[Any]
@@ -196,6 +218,11 @@ class _Machine:
 
     def depth(self) -> Node:
         return self.lift.op("add", self.buried, self.lift.number(len(self.stack)))
+
+    @property
+    def elements(self) -> Sequence[Element]:
+        found: Sequence[Element] = self.calculator.elements
+        return found
 
     def element(self, index: int, values: Sequence[Node]) -> list[Node]:
         return self.lift.element(self.elements[index], values)
@@ -225,7 +252,9 @@ def _execute(block: Block, machine: _Machine) -> None:
         kept = len(stack) - pops
         values = stack[kept:]
         del stack[kept:]
+        first = len(machine.lift.graph.nodes)
         stack += _apply(step, values, machine)
+        machine.lift.mark(first, machine.calculator, step.position)
 
 
 def _apply(step: Step, values: Sequence[Node], machine: _Machine) -> Sequence[Node]:
@@ -265,11 +294,13 @@ def _choose(step: Step, machine: _Machine) -> None:
     lift = machine.lift
     blocks = [*step.branches, step.otherwise or ()]
     value = machine.stack.pop()
+    first = len(lift.graph.nodes)
     if step.op.name == "if":
         conditions = [lift.truth(value)]
     else:
         number = lift.op("rond", value)
         conditions = [lift.op("eq", number, lift.number(i)) for i in range(len(step.branches))]
+    lift.mark(first, machine.calculator, step.position)
     before = machine.fork()
     _execute(blocks[-1], machine)
     for condition, block in zip(reversed(conditions), reversed(blocks[:-1]), strict=True):

@@ -99,6 +99,8 @@ class Shapes:
         return any(squares) and (total.op != "add" or all(map(self.not_negative, parts)))
 
     def total(self, node: Node, value: Interval) -> Interval:
+        if not _divisors(node.arguments[1]):
+            return value
         parts = chain(node, "add")
         products = [part.arguments for part in parts if part.op == "mul"]
         if len(products) == len(parts):
@@ -106,9 +108,7 @@ class Shapes:
             if all(found and self._is_unit(*found) for found in lengths):
                 slack = 16 * len(parts) * self.arithmetic.epsilon
                 value = value.meet(Interval(-1 - slack, 1 + slack))
-        divisors = {
-            factor.arguments[1] for part in parts for factor in chain(part, "mul") if factor.op == "div"
-        }
+        divisors = set().union(*map(_divisors, parts))
         if len(divisors) == 1:
             (below,) = divisors
             value = self._mean(_terms(node, below), below, value)
@@ -226,6 +226,11 @@ def _terms(node: Node, divisor: Node | None = None) -> dict[_Factors, float] | N
         factors = tuple(sorted(others, key=lambda node: node.index))
         terms[factors] = terms.get(factors, 0.0) + factor
     return terms
+
+
+def _divisors(product: Node) -> set[Node]:
+    """What the factors of a product are divided by."""
+    return {factor.arguments[1] for factor in chain(product, "mul") if factor.op == "div"}
 
 
 def _quotients(nodes: tuple[Node, ...]) -> tuple[tuple[Node, ...], Node] | None:

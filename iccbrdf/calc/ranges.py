@@ -41,10 +41,12 @@ VARIABLE_RANGE: Range = (-1000.0, 1000.0)
 
 MAX_CONTEXTUAL = 10_000
 """Nodes of a graph up to which contexts are used; selects of larger ones may be either side, always."""
-MAX_EVALUATIONS = 200_000
+MAX_EVALUATIONS = 100_000
 """Values computed in contexts, after which no new contexts are made."""
-MAX_TRIALS = 60_000
+MAX_TRIALS = 20_000
 """Values computed in proofs by cases, after which none is tried."""
+_MAX_TRIALS_EACH = 5_000
+"""The same for one operation."""
 _MAX_PIECES = 32
 """Pieces that a range is cut into."""
 _FEW = 4
@@ -156,8 +158,9 @@ class _Analyser:
         self.root = _Context()
         self.ranges: dict[Node, Interval] = {}
         self.hazards: dict[Node, Hazard] = {}
+        self.tables: dict[tuple[Node, tuple[Interval, ...]], Interval] = {}
         self.given_up: set[tuple[_Claim, _Context]] = set()
-        self.evaluations = self.trials = 0
+        self.evaluations = self.trials = self.allowed = 0
         for position, node in enumerate(self.live):
             self.bit[node] = 1 << position if self.contextual else 0
             self.behind[node] = 0
@@ -169,7 +172,7 @@ class _Analyser:
         for output in self.graph.outputs:
             value = self.value(output, self.root)
             if not (value.finite or self.hazards):
-                self.hazards[output] = Hazard("output", output, output, value, "")
+                self.hazards[output] = Hazard("output", output, output, value)
         hazards = sorted(self.hazards.values(), key=lambda hazard: hazard.node.index)
         return Analysis(self.ranges, tuple(hazards))
 
@@ -279,16 +282,24 @@ class _Analyser:
         a = self.arithmetic
         if any(argument.empty for argument in arguments):
             return EMPTY
-        if node.op == "pick":
-            return _component(a, node, arguments)
-        if node.op == "curve":
-            return curve_range(a, node.detail, arguments[0])
+        if node.op in ("pick", "curve"):
+            return self.looked_up(node, tuple(arguments))
         if node.op == "mul" and node.arguments[0] is node.arguments[1]:
             return square(a, arguments[0])
         shapes = Shapes(
             a, lambda other: self.known(other, context), lambda other: context.alike.get(other, other)
         )
         return shapes.narrowed(node, a.apply(node.op, *arguments))
+
+    def looked_up(self, node: Node, arguments: tuple[Interval, ...]) -> Interval:
+        """The values of a curve or of one result of a node of several; tables are large, so only once."""
+        key = node, arguments
+        if key not in self.tables:
+            if node.op == "curve":
+                self.tables[key] = curve_range(self.arithmetic, node.detail, arguments[0])
+            else:
+                self.tables[key] = _component(self.arithmetic, node, arguments)
+        return self.tables[key]
 
     # Contexts ------------------------------------------------------------------------------------------
 
@@ -331,6 +342,7 @@ class _Analyser:
 
     def examine(self, node: Node, arguments: list[Interval], context: _Context, hazard: Hazard) -> _Wanted:
         """The range of a node that may fail, after a search for a proof that it does not."""
+        self.allowed = min(self.trials + _MAX_TRIALS_EACH, MAX_TRIALS)
         if hazard.kind == "division" and node.op == "div":
             divisor = hazard.operand
             where = self.home(divisor, context)
@@ -348,8 +360,10 @@ class _Analyser:
 
     def by_cases(self, claim: _Claim, context: _Context, *, nested: bool = False) -> _Attempt:
         """The range of the claim's node if it is true in all of some cases; None where that is not seen."""
-        if not self.contextual or (claim, context) in self.given_up:
+        if not self.contextual or (claim, context) in self.given_up or self.trials > self.allowed:
             return None
+        # The search itself takes time, too.
+        self.trials += self.behind[claim.node].bit_count() // 8
         for cases in self.enumerated(claim.node, context, nested):
             value = yield from self.by_list(claim, cases, context, nested)
             if value is not None:
@@ -378,7 +392,7 @@ class _Analyser:
         """The range of the claim's node in one case; None where the claim may be false."""
         if inside is None:
             return EMPTY
-        if self.trials > MAX_TRIALS:
+        if self.trials > self.allowed:
             return None
         value = yield claim.node, inside
         unsafe = claim.node in self.home(claim.node, inside).unsafe
