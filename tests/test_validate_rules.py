@@ -359,7 +359,8 @@ def test_a_sound_pair_breaks_nothing():
 
 
 def test_every_rule_is_broken_here():
-    assert {rule for rule, *_ in BROKEN + PAIRS} | {"TAG-003"} == set(RULES)
+    elsewhere = {"TAG-003", *(rule for rule in RULES if rule.startswith("NUM"))}
+    assert {rule for rule, *_ in BROKEN + PAIRS} | elsewhere == set(RULES)
 
 
 def test_rules_are_whole():

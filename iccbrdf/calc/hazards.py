@@ -17,17 +17,13 @@ of an integer; an output that is not finite by no fault of one operation."""
 
 @dataclass(frozen=True)
 class Hazard:
-    """`operand` of `node` reaches `range`; `remedy` has {} for it, and is empty where none is known."""
+    """`operand` of `node`, x in the smallest `guard`, lies in `range`; where none is known, that is empty."""
 
     kind: Kind
     node: Node
     operand: Node
     range: Interval
-    remedy: str = ""
-
-    def guard(self, names: Sequence[str] = ()) -> str:
-        """The smallest change of the operand that makes the operation safe; `names` of input channels."""
-        return self.remedy.format(expression(self.operand, names))
+    guard: str = ""
 
 
 def hazard_of(a: Arithmetic, node: Node, arguments: Sequence[Interval], result: Interval) -> Hazard | None:
@@ -43,9 +39,9 @@ def hazard_of(a: Arithmetic, node: Node, arguments: Sequence[Interval], result: 
         return _hazard("division", node, arguments, 1, _away_from_zero(a, *arguments))
     if op == "pow" and arguments[0].holds(0.0) and arguments[1].low < 0:
         least = max(a.largest ** (1 / min(arguments[1].low, -1.0)), a.smallest_normal)
-        return _hazard("division", node, arguments, 0, f"max({{}}, {_up(least)})")
+        return _hazard("division", node, arguments, 0, f"max(x, {_up(least)})")
     if op in ("log", "ln") and arguments[0].low <= 0:
-        return _hazard("domain", node, arguments, 0, f"max({{}}, {_up(a.smallest_normal)})")
+        return _hazard("domain", node, arguments, 0, f"max(x, {_up(a.smallest_normal)})")
     if result.nan:
         return _hazard("domain", node, arguments, 0, _DOMAINS.get(op, ""))
     if op in ("trnc", "rond") and not fits_integer(arguments[0]):
@@ -55,19 +51,19 @@ def hazard_of(a: Arithmetic, node: Node, arguments: Sequence[Interval], result: 
     return None
 
 
-def _hazard(kind: Kind, node: Node, arguments: Sequence[Interval], index: int, remedy: str) -> Hazard:
+def _hazard(kind: Kind, node: Node, arguments: Sequence[Interval], index: int, guard: str) -> Hazard:
     if node.op == "pick":
         node = node.arguments[0]
-    return Hazard(kind, node, node.arguments[index], arguments[index], remedy)
+    return Hazard(kind, node, node.arguments[index], arguments[index], guard)
 
 
 # Guards ------------------------------------------------------------------------------------------------
 
 _DOMAINS: Mapping[str, str] = {
-    "sqrt": "max({}, 0)",
-    "pow": "max({}, 0)",
-    "asin": "min(max({}, -1), 1)",
-    "acos": "min(max({}, -1), 1)",
+    "sqrt": "max(x, 0)",
+    "pow": "max(x, 0)",
+    "asin": "min(max(x, -1), 1)",
+    "acos": "min(max(x, -1), 1)",
 }
 
 
@@ -88,10 +84,10 @@ def _away_from_zero(a: Arithmetic, dividend: Interval, divisor: Interval) -> str
     # A quotient by less would not be finite.
     least = _up(max(dividend.magnitude / a.largest * 1.01, a.smallest_normal))
     if divisor.low >= 0:
-        return f"max({{}}, {least})"
+        return f"max(x, {least})"
     if divisor.high <= 0:
-        return f"min({{}}, -{least})"
-    return f"divide only where abs({{}}) > {least}"
+        return f"min(x, -{least})"
+    return f"divide only where abs(x) > {least}"
 
 
 def _held(x: Interval, limit: float) -> str:
@@ -100,10 +96,10 @@ def _held(x: Interval, limit: float) -> str:
         return ""
     text = _down(limit)
     if x.low >= -limit:
-        return f"min({{}}, {text})"
+        return f"min(x, {text})"
     if x.high <= limit:
-        return f"max({{}}, -{text})"
-    return f"min(max({{}}, -{text}), {text})"
+        return f"max(x, -{text})"
+    return f"min(max(x, -{text}), {text})"
 
 
 def _in_range(a: Arithmetic, node: Node, arguments: Sequence[Interval]) -> tuple[int, str]:

@@ -5,6 +5,7 @@ A further source of findings is a function from a `Subject` to findings: its rul
 """
 
 from iccbrdf.validate.findings import Finding, Place
+from iccbrdf.validate.numeric import channels_and_variables, check_numeric, only_mid
 from iccbrdf.validate.report import CHECKS, Check, Report, validate, validate_pair
 from iccbrdf.validate.rules import RULES, SEVERITIES, Rule
 from iccbrdf.validate.subject import Subject
@@ -19,6 +20,9 @@ __all__ = [
     "Report",
     "Rule",
     "Subject",
+    "channels_and_variables",
+    "check_numeric",
+    "only_mid",
     "validate",
     "validate_pair",
 ]

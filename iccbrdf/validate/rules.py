@@ -3,7 +3,8 @@
 Ids are stable: a rule that is given up leaves a gap.  The first three letters name the area: HDR header,
 PID profile ID, TAB tag table, TAG tags and their types, REQ required tags, TXT texts, MCS multiplex channels,
 MPE processing elements, PRG calculator programs, REF behaviour of the reference implementation that a
-portable profile avoids, PCC viewing conditions, LNK a MID with an MVIS, ALL the check itself.
+portable profile avoids, NUM numbers, where that check is asked for, PCC viewing conditions, LNK a MID with an
+MVIS, ALL the check itself.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ class Rule:
 
 
 _REFERENCE = "reference implementation (iccDEV)"
+_NUMERIC = "IEEE 754, interval analysis of the program"
 
 _ROWS = (
     Rule("HDR-001", "error", "The file holds a header of 128 bytes, signed acsp.", "ICC.2, 7.2"),
@@ -153,6 +155,13 @@ _ROWS = (
          f"{_REFERENCE}: other shapes give zeros or fail"),
     Rule("REF-003", "warning", "No block that is empty at the end of a sequence.",
          f"{_REFERENCE}: 'else' gives -1 on all outputs, 'case' and 'dflt' are refused"),
+
+    Rule("NUM-001", "error", "No operation divides by 0 for any input in the declared ranges.", _NUMERIC),
+    Rule("NUM-002", "error", "No operation is given what it has no result for, as a root is of a negative "
+         "number.", _NUMERIC),
+    Rule("NUM-003", "error", "No operation overflows float32, or the 32 bits of an integer.", _NUMERIC),
+    Rule("NUM-004", "error", "Every output is finite.", _NUMERIC),
+    Rule("NUM-005", "warning", "The numbers of every transform can be examined.", "limit of this library"),
 
     Rule("PCC-001", "error", "Observer and illuminant are listed ones, custom ones come with their tables.",
          "ICC.2, 10.2.21"),
