@@ -1,0 +1,153 @@
+"""The body of a schedule as GLSL ES 3.00, for one pixel: a back end of the graph.
+
+What GLSL leaves to the driver is not relied upon: NaN is told by its bits (drivers fold comparisons), powers
+and logarithms have their special cases written out, and sines and angles, of which drivers give few digits,
+are computed here.  Within the accuracy of the driver's exp, log2 and exp2 the results are those of the
+interpreter for all finite numbers.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from iccbrdf.calc.graph import Node, is_truth
+from iccbrdf.calc.schedule import Schedule, computed
+from iccbrdf.viewer.straight import Language, name_of, numbers, statements
+
+
+def literal(value: float) -> str:
+    """A float32 number, to the bit."""
+    number = np.float32(value)
+    if not np.isfinite(number):
+        return f"uintBitsToFloat({number.view(np.uint32):#010x}u)"
+    text = np.format_float_scientific(number, unique=True, trim="0")
+    return f"({text})" if math.copysign(1, value) < 0 else text
+
+
+GLSL = Language(
+    name="GLSL",
+    patterns={
+        "neg": "-{0}", "abs": "abs({0})", "sqrt": "sqrt({0})", "cbrt": "cubeRoot({0})",
+        "flor": "floor({0})", "ceil": "ceil({0})", "trnc": "trunc({0})",
+        "rond": "sign({0}) * floor(abs({0}) + 0.5)", "sign": "sign({0})",
+        "exp": "exp({0})", "log": "0.434294482 * logarithm({0})", "ln": "logarithm({0})",
+        "sin": "sine({0})", "cos": "cosine({0})", "tan": "(sine({0}) / cosine({0}))",
+        "asin": "angle(sqrt((1.0 - {0}) * (1.0 + {0})), {0})",
+        "acos": "angle({0}, sqrt((1.0 - {0}) * (1.0 + {0})))",
+        "atan": "angle(1.0, {0})", "atn2": "angle({0}, {1})",
+        "add": "{0} + {1}", "sub": "{0} - {1}", "mul": "{0} * {1}", "div": "{0} / {1}",
+        "mod": "remainder({0}, {1})", "pow": "power({0}, {1})",
+        "vmin": "({0} < {1} ? {0} : {1})", "vmax": "({0} > {1} ? {0} : {1})",
+        "lt": "{0} < {1}", "le": "{0} <= {1}", "gt": "{0} > {1}", "ge": "{0} >= {1}",
+        "eq": "same({0}, {1})", "neq": "!same({0}, {1})", "rnum": "isFinite({0})",
+        "not": "!{0}", "vand": "{0} && {1}", "vor": "{0} || {1}", "vxor": "{0} != {1}",
+        "select": "({0} ? {1} : {2})",
+    },
+    literal=literal,
+    declare="{type} {name} = {value};",
+    number="float",
+    truth="bool",
+    from_truth="float({0})",
+)  # fmt: skip
+
+FUNCTIONS = {
+    "isFinite": "bool isFinite(float a) { return (floatBitsToUint(a) & 0x7f800000u) != 0x7f800000u; }",
+    "isNaN": "bool isNaN(float a) { return (floatBitsToUint(a) & 0x7fffffffu) > 0x7f800000u; }",
+    "same": "bool same(float a, float b) { return a == b || (isNaN(a) && isNaN(b)); }",
+    # log2 of 0 is a large number with some drivers.
+    "logarithm": """float logarithm(float a) {
+  if (a > 0.0) return log2(a) * 0.693147181;
+  return uintBitsToFloat(a == 0.0 ? 0xff800000u : 0x7fc00000u);
+}""",
+    "power": """float power(float a, float b) {
+  if (b == 0.0) return 1.0;
+  if (a > 0.0) return exp2(b * log2(a));
+  if (a == 0.0) return b > 0.0 ? 0.0 : uintBitsToFloat(0x7f800000u);
+  if (b != floor(b)) return uintBitsToFloat(0x7fc00000u);
+  return exp2(b * log2(-a)) * (b == 2.0 * floor(b * 0.5) ? 1.0 : -1.0);
+}""",
+    # A step of Newton's makes the driver's power a root of full precision.
+    "cubeRoot": """float cubeRoot(float a) {
+  if (a == 0.0 || !isFinite(a)) return a;
+  float b = sign(a) * exp2(log2(abs(a)) * 0.333333333);
+  return b - (b * b * b - a) / (3.0 * b * b);
+}""",
+    "remainder": """float remainder(float a, float b) {
+  if (b == 0.0) return a;
+  float rest = abs(a) - abs(b) * floor(abs(a) / abs(b));
+  rest = rest < 0.0 ? rest + abs(b) : rest >= abs(b) ? rest - abs(b) : rest;
+  return a < 0.0 ? -rest : rest;
+}""",
+    # Taylor series, to the last bit within an eighth of a turn; the turns are taken off in two parts.
+    "wave": """float wave(float a, int shift) {
+  float turns = floor(a * 0.636619772 + 0.5);
+  float r = (a - turns * 1.5707963) - turns * 2.67948966e-8;
+  int quarter = (int(turns) + shift) & 3;
+  float s = r * r;
+  float odd = r * (1.0 + s * (-0.166666667 + s * (8.33333333e-3 + s * (-1.98412698e-4 + s * 2.75573192e-6))));
+  float even = 1.0 + s * (-0.5 + s * (0.0416666667 + s * (-1.38888889e-3 + s * 2.48015873e-5)));
+  float value = (quarter & 1) == 0 ? odd : even;
+  return quarter < 2 ? value : -value;
+}""",
+    "sine": "float sine(float a) { return wave(a, 0); }",
+    "cosine": "float cosine(float a) { return wave(a, 1); }",
+    # Taylor series of the arc tangent of at most tan(pi / 16), after two halvings of the angle.
+    "angle": """float angle(float x, float y) {
+  float a = abs(x), b = abs(y);
+  float ratio = max(a, b) == 0.0 ? 0.0 : min(a, b) / max(a, b);
+  float half1 = ratio / (1.0 + sqrt(1.0 + ratio * ratio));
+  float t = half1 / (1.0 + sqrt(1.0 + half1 * half1));
+  float s = t * t;
+  float value = 4.0 * t * (1.0 + s * (-0.333333333 + s * (0.2 + s * (-0.142857143 + s * 0.111111111))));
+  value = b > a ? 1.57079633 - value : value;
+  value = x < 0.0 ? 3.14159265 - value : value;
+  return y < 0.0 ? -value : value;
+}""",
+}
+"""What patterns call, each after what it calls itself."""
+
+
+def function_body(
+    plan: Schedule, inputs: Mapping[int, str], results: Sequence[str], arguments: str
+) -> str:
+    """The statements that assign the outputs of a schedule.
+
+    Parameters
+    ----------
+    inputs
+        An expression of type float for each input channel that is read.
+    results
+        What the outputs are assigned to, in order.
+    arguments
+        The name of the array of floats that holds the values of the schedule's arguments.
+
+    Raises
+    ------
+    UnsupportedError
+        A node that GLSL has no counterpart for: a table, a curve or `solv`.
+    """
+    nodes = list(computed(plan.body))
+    read = {node: inputs[node.detail] for node in nodes if node.op == "input"}
+    known = {
+        node: f"({arguments}[{k}] > 0.5)" if is_truth(node) else f"{arguments}[{k}]"
+        for k, node in enumerate(plan.arguments)
+    }
+    lines = [f"float {name_of(node)} = {text};" for node, text in read.items()]
+    known |= {node: name_of(node) for node in read}
+    lines += statements(GLSL, nodes, known)
+    outputs = numbers(GLSL, plan.graph.outputs, known)
+    lines += [f"{result} = {value};" for result, value in zip(results, outputs, strict=True)]
+    return "\n".join(f"  {line}" for line in lines)
+
+
+def functions_for(text: str) -> str:
+    """The functions of `FUNCTIONS` that `text` calls, and those that they call."""
+    needed: list[str] = []
+    for name, definition in reversed(FUNCTIONS.items()):
+        if any(re.search(rf"\b{name}\(", place) for place in (text, *needed)):
+            needed.insert(0, definition)
+    return "\n".join(needed)

@@ -1,0 +1,104 @@
+"""Lifted graphs as straight-line text: what GLSL and JavaScript have in common, by a table of operators.
+
+Both languages are written from one `Language`: how a number is spelt, and for each operator of the graph a
+pattern.  Every node becomes one constant; conditions are booleans, and a select takes one of its sides by
+`?:`, so that no NaN of the other one gets through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+from iccbrdf.calc.graph import LOGIC, Node, is_truth
+from iccbrdf.errors import UnsupportedError
+
+
+@dataclass(frozen=True)
+class Language:
+    """A target of `statements`.
+
+    Attributes
+    ----------
+    name
+        For messages.
+    patterns
+        Text by operator, with {0}, {1}, ... for the arguments.
+    literal
+        The text of a number.
+    declare
+        A pattern of {type}, {name}, {value}: a constant and its value.
+    number, truth
+        Names of the two types; `from_truth` is the pattern that makes a number of a condition.
+    """
+
+    name: str
+    patterns: Mapping[str, str]
+    literal: Callable[[float], str]
+    declare: str
+    number: str
+    truth: str
+    from_truth: str
+
+
+def statements(language: Language, nodes: Iterable[Node], known: Mapping[Node, str]) -> list[str]:
+    """A line of text for each of `nodes`, which come after what they read.
+
+    Parameters
+    ----------
+    known
+        Texts of the nodes that are computed elsewhere: inputs, run-time variables, arguments.
+
+    Raises
+    ------
+    UnsupportedError
+        The language has no pattern for a node.
+    """
+    writer = _Writer(language, known)
+    lines = []
+    for node in nodes:
+        if node in known or node.op == "const":
+            continue
+        kind = language.truth if is_truth(node) else language.number
+        lines.append(language.declare.format(type=kind, name=name_of(node), value=writer.expression(node)))
+    return lines
+
+
+def numbers(language: Language, nodes: Iterable[Node], known: Mapping[Node, str]) -> list[str]:
+    """The texts of nodes as numbers, which `statements` has declared."""
+    writer = _Writer(language, known)
+    return [writer.number(node) for node in nodes]
+
+
+def name_of(node: Node) -> str:
+    """The constant that holds a node."""
+    return f"v{node.index}"
+
+
+@dataclass(frozen=True)
+class _Writer:
+    language: Language
+    known: Mapping[Node, str]
+
+    def expression(self, node: Node) -> str:
+        if node.op not in self.language.patterns:
+            raise UnsupportedError(f"{node.op!r} cannot be written in {self.language.name}")
+        takes_truth = [node.op in LOGIC or (node.op == "select" and k == 0) for k in range(len(node.arguments))]
+        texts = [
+            self.condition(argument) if truth else self.number(argument)
+            for argument, truth in zip(node.arguments, takes_truth, strict=True)
+        ]
+        return self.language.patterns[node.op].format(*texts)
+
+    def number(self, node: Node) -> str:
+        text = self._text(node)
+        return self.language.from_truth.format(text) if is_truth(node) else text
+
+    def condition(self, node: Node) -> str:
+        text = self._text(node)
+        return text if is_truth(node) else f"({text} >= 0.5)"
+
+    def _text(self, node: Node) -> str:
+        if node.op == "const":
+            return self.language.literal(node.detail[0])
+        return self.known.get(node) or name_of(node)
