@@ -28,7 +28,13 @@ def without_decoding(stage: Stage) -> Stage:
             f"{stage.where}: real samples need a profile that first decodes its device channels by a matrix, "
             f"one channel a row; found {elements[0].signature!r}"
         )
-    names = tuple(stage.source.names[i] for i in inputs)
+    own = stage.source.names
+    if len(inputs) < len(own):
+        # Channels that go no further are still the caller's.
+        selection = np.eye(len(own), dtype=np.float32)[list(inputs)]
+        first = Matrix(inputs=len(own), matrix=selection, offset=np.zeros(len(inputs), np.float32))
+        return replace(stage, process=replace(stage.process, elements=(first, *elements[1:])))
+    names = tuple(own[i] for i in inputs)
     return replace(
         stage,
         process=MultiProcess(len(names), stage.process.outputs, elements[1:]),

@@ -133,10 +133,13 @@ def _decoded_names(profile: Profile, count: int) -> tuple[str, ...] | None:
 
 
 def single_inputs(element: Any) -> tuple[int, ...] | None:
-    """For each row of a decoding matrix its one input, each input once; None for any other element."""
-    if element.signature != "matf" or element.matrix is None or element.inputs != element.outputs:
+    """For each row of a decoding matrix its one input, none of them twice; None for any other element.
+
+    Inputs that no row takes are device channels that go no further.
+    """
+    if element.signature != "matf" or element.matrix is None:
         return None
     used = [np.flatnonzero(row) for row in element.matrix]
-    if any(len(u) != 1 for u in used) or len({int(u[0]) for u in used}) != element.inputs:
+    if any(len(u) != 1 for u in used) or len({int(u[0]) for u in used}) != len(used):
         return None
     return tuple(int(u[0]) for u in used)
