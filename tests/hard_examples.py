@@ -1,0 +1,329 @@
+"""Adversarial geometry and material, and how far a program in float32 may be from float64 on it.
+
+Shared by the tests and by tools/hard_cases.py.  Directions and pixels are float32 numbers throughout: what
+float64 computes from them is what float32 is measured against.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import iccbrdf
+from iccbrdf.brdf.models import MODELS
+from iccbrdf.brdf.primaries import Primaries, Primary
+from iccbrdf.build import build_pair
+from iccbrdf.icc import Profile
+
+Array = NDArray[np.float64]
+Pixels = NDArray[np.float32]
+
+BACKENDS = ("interpreter", "numpy", "llvm")[: 3 if find_spec("llvmlite") else 2]
+DTYPES = ("float32", "float64")
+
+LENGTHS = (1e-3, 4.0)
+"""Of normals that have a direction; the longest is four times what a channel is declared to hold."""
+
+
+class Promise(NamedTuple):
+    """The largest relative error of the whole, diffuse and specular, in float32 with kd of at least .01."""
+
+    least_m: float
+    least_cosine: float
+    """Of light and viewer with the normal."""
+    error: float
+
+
+GRAZING = 0.01
+"""Cosine from which on the promises hold as they stand, half a degree above the horizon.
+
+The scalar product of two float32 vectors has an absolute error of about 1e-7, which is a relative one of
+1e-7 / cos: below this cosine what is promised grows as GRAZING / cosine.
+"""
+
+PROMISES = (
+    Promise(0.05, GRAZING, 1e-4),
+    Promise(0.01, 0.1, 5e-4),
+    Promise(0.01, GRAZING, 2e-3),
+    Promise(1e-3, GRAZING, 5e-2),
+)
+
+LEAST_COSINE = 1e-7
+"""Below it the sign of a cosine is lost in float32, and with it what is lit."""
+
+NOTHING_LEFT = 0.5
+"""A promise that has grown to this is none: the exponent of a lobe is known to no digit, and is one of e."""
+
+
+def promised(m: Array, cosine: Array) -> Array:
+    """The largest relative error by m and cosine, which broadcast; infinite where nothing is promised."""
+    error = np.full(np.broadcast_shapes(m.shape, cosine.shape), np.inf)
+    growth = np.maximum(1, GRAZING / np.maximum(cosine, LEAST_COSINE))
+    for promise in PROMISES:
+        holds = (m >= promise.least_m) & (cosine * growth >= promise.least_cosine)
+        error = np.where(holds, np.minimum(error, promise.error * growth), error)
+    return np.where((error < NOTHING_LEFT) & (cosine >= LEAST_COSINE), error, np.inf)
+
+
+def primaries(model: str) -> Primaries:
+    """A primaries file's contents in memory; the parameters of its one colour do not enter a MVIS."""
+    return Primaries(
+        model=model,
+        illuminant="D50",
+        observer="CIE 1931 2 Degree Standard Observer",
+        white=(0.9642, 1.0, 0.8249),
+        geometry="45:0",
+        source="none",
+        primaries=(Primary("any", (0.5,) * 3, (0.5,) * len(MODELS[model].channels)),),
+    )
+
+
+@cache
+def mvis_of(model: str, fresnel_angle: str | None = None) -> Profile:
+    """A model's MVIS."""
+    return build_pair(primaries(model), fresnel_angle=fresnel_angle).mvis
+
+
+def held_index() -> float:
+    """The refractive index whose R0 is the float32 that a program holds for 1.5."""
+    root = np.sqrt(float(np.float32(0.04)))
+    return float((1 + root) / (1 - root))
+
+
+def variables(light: Array, view: Array) -> dict[str, float]:
+    """The run-time variables of two directions."""
+    names = ("litX", "litY", "litZ", "vueX", "vueY", "vueZ")
+    return dict(zip(names, map(float, (*light, *view)), strict=True))
+
+
+# Directions -------------------------------------------------------------------------------------------------
+
+
+def unit(v: Array) -> Array:
+    """Vectors (..., 3) at length 1; those of no length stay 0."""
+    length = np.sqrt(np.sum(v * v, axis=-1, keepdims=True))
+    scaled: Array = np.divide(v, length, out=np.zeros_like(v), where=length > 0)
+    return scaled
+
+
+def _upwards(rng: np.random.Generator) -> Array:
+    """A direction above the print, all zenith angles alike."""
+    zenith, azimuth = rng.uniform(0, np.pi / 2), rng.uniform(0, 2 * np.pi)
+    return np.array([np.sin(zenith) * np.cos(azimuth), np.sin(zenith) * np.sin(azimuth), np.cos(zenith)])
+
+
+def _at_cosine(axis: Array, cosine: Array, rng: np.random.Generator) -> Array:
+    """Unit vectors (n, 3) of given cosines (n) with a unit axis, at random azimuths."""
+    across = unit(np.cross(axis, rng.normal(size=(len(cosine), 3))))
+    return cosine[:, None] * axis + np.sqrt(1 - cosine[:, None] ** 2) * across
+
+
+def _mirrored(rng: np.random.Generator) -> tuple[Array, Array]:
+    """Light and viewer on two sides of an axis, down to grazing."""
+    axis = _upwards(rng)
+    half = axis * 10 ** rng.uniform(-7, 0)
+    across = _at_cosine(axis, np.zeros(1), rng)[0] * np.sqrt(1 - half @ half)
+    return half + across, half - across
+
+
+def _level(v: Array, z: float = 0.0) -> Array:
+    return np.array([v[0], v[1] + 1e-3, z])
+
+
+def directions(rng: np.random.Generator) -> Iterator[tuple[Array, Array]]:
+    """Pairs of light and viewer without end, as float32 holds them; every kind in turn, of any length."""
+    while True:
+        light, view = _upwards(rng), _upwards(rng)
+        low = 10 ** rng.uniform(-7, -1)
+        near = 10 ** rng.uniform(-7, -3) * rng.normal(size=3)
+        for pair in (
+            (light, view),
+            _mirrored(rng),
+            (light, light),
+            (light, light + near),
+            (light, -light),
+            (light, -light + near),
+            _mirrored(rng),
+            (_level(light, low), view),
+            (light, _level(view, low)),
+            (_level(light, low), -_level(light, -low)),
+            (_level(light), view),
+            (light, _level(view)),
+            (np.array([0, 0, 1.0]), view),
+            (_upwards(rng), _upwards(rng)),
+        ):
+            scaled = [v * 10 ** rng.choice([0, 0, rng.uniform(-3, 3)]) for v in pair]
+            yield tuple(np.float32(v).astype(np.float64) for v in scaled)  # type: ignore[misc]
+
+
+def _normals(light: Array, view: Array, m: Array, rng: np.random.Generator) -> Array:
+    """Half within 3 m of the half vector; others of all kinds, one in 16 of no direction; any length."""
+    count = len(m)
+    i, v = unit(light), unit(view)
+    half = unit(i + v)
+    angle = np.minimum(3 * m * rng.uniform(0, 1, count), np.pi / 2)
+    n = _at_cosine(half, np.cos(angle), rng)
+    kind = rng.integers(0, 16, count)
+    low = 10 ** rng.uniform(-7, 0, count)
+    for kinds, others in (
+        ((8, 9, 10), unit(rng.normal(size=(count, 3)) * [1, 1, 2])),
+        ((11,), _at_cosine(i, low, rng)),
+        ((12,), _at_cosine(v, low, rng)),
+        ((13,), np.broadcast_to([0.0, 0, 1], (count, 3))),
+        ((14,), -n),
+        ((15,), np.zeros((count, 3))),
+    ):
+        n = np.where(np.isin(kind, kinds)[:, None], others, n)
+    length = np.where(rng.random(count) < 0.5, 1, 10 ** rng.uniform(*np.log10(LENGTHS), count))
+    return np.asarray(n * length[:, None])
+
+
+def smallest_cosine(pixels: Pixels, light: Array, view: Array) -> Array:
+    """The lesser cosine of light and viewer with the normals, the last three channels; shape (n)."""
+    n = unit(pixels[:, -3:].astype(np.float64))
+    return np.minimum(n @ unit(light), n @ unit(view))
+
+
+# Material ---------------------------------------------------------------------------------------------------
+
+
+def prints(model: str, light: Array, view: Array, count: int, rng: np.random.Generator) -> Pixels:
+    """Pixels (count, channels) of prints: kd at least .01, ks from 0, m from 1e-4; see `_normals`."""
+    names = MODELS[model].channels
+    columns = {}
+    for name in names:
+        if name.startswith("m"):
+            columns[name] = 10 ** rng.uniform(-4, 0, count)
+        elif name.startswith("ks"):
+            columns[name] = rng.choice([0, 1, 1, 1], count) * 10 ** rng.uniform(-3, 0, count)
+        else:
+            columns[name] = 10 ** rng.uniform(-2, 0, count)
+    if model == "cook_torrance_2020":
+        # Its (1 - ks) Rd is what the others call kd.
+        columns["ks"] *= 0.9
+        for name in names[:3]:
+            columns[name] = np.minimum(columns[name] / (1 - columns["ks"]) + 1e-6, 1)
+    least_m = np.min([columns[name] for name in names if name.startswith("m")], axis=0)
+    n = _normals(light, view, least_m, rng)
+    return np.column_stack([*columns.values(), n]).astype(np.float32)
+
+
+def anything(channels: int, count: int, rng: np.random.Generator, largest: float = 4.0) -> Pixels:
+    """Pixels of any numbers up to `largest` in size: both signs, zeros, ones, and next to nothing."""
+    values = rng.uniform(-largest, largest, (count, channels))
+    tiny = rng.choice([-1, 1], values.shape) * 10 ** rng.uniform(-45, 0, values.shape)
+    ends = rng.choice([0.0, -0.0, 1, -1, 1e-4, largest, -largest], values.shape)
+    kind = rng.integers(0, 4, values.shape)
+    mixed = np.select([kind == 0, kind == 1], [tiny, ends], np.where(kind == 2, abs(values), values))
+    # Half a pixel's channels at a time: else hardly any would be lit.
+    ordinary = rng.random((count, 1)) < 0.5
+    mixed[:, -3:] = np.where(ordinary, rng.normal(size=(count, 3)) * [0.3, 0.3, 0] + [0, 0, 1], mixed[:, -3:])
+    return mixed.astype(np.float32)
+
+
+def roughness(model: str, pixels: Pixels) -> Array:
+    """m for X, Y and Z, shape (n, 3)."""
+    columns = [k for k, name in enumerate(MODELS[model].channels) if name.startswith("m")]
+    return np.broadcast_to(pixels[:, columns].astype(np.float64), (len(pixels), 3))
+
+
+def relative_error(found: NDArray[np.floating], expected: Array) -> Array:
+    """|found - expected| / |expected|; what is not a number is infinitely wrong, 0 for 0 is right."""
+    with np.errstate(all="ignore"):
+        error = np.abs(found - expected) / np.abs(expected)
+    error = np.where(found == expected, 0.0, error)
+    return np.asarray(np.nan_to_num(error, nan=np.inf))
+
+
+# All of it by every back end --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Look:
+    """One light and one viewer on pixels of prints, which come first, and of any numbers."""
+
+    model: str
+    light: Array
+    view: Array
+    pixels: Pixels
+    prints: int
+    XYZ: Mapping[tuple[str, str], NDArray[np.floating]]
+    """Results by back end and number type."""
+
+    @property
+    def printed(self) -> Pixels:
+        """The pixels of prints."""
+        return self.pixels[: self.prints]
+
+    @property
+    def m(self) -> Array:
+        """Roughness of the prints for X, Y and Z, (n, 3)."""
+        return roughness(self.model, self.printed)
+
+    @property
+    def cosine(self) -> Array:
+        """The lesser cosine of light and viewer on the prints, (n, 1)."""
+        return smallest_cosine(self.printed, self.light, self.view)[:, None]
+
+    def of_prints(self, backend: str, dtype: str) -> Array:
+        """XYZ of the prints in float64, (n, 3)."""
+        return self.XYZ[backend, dtype][: self.prints].astype(np.float64)
+
+
+def looks(model: str, geometries: int, prints_each: int, anything_each: int, seed: int) -> Iterator[Look]:
+    """Results of a model's MVIS under so many lights and viewers, by every back end in both number types."""
+    rng, mvis = np.random.default_rng(seed), mvis_of(model)
+    transforms = {
+        (backend, dtype): iccbrdf.link([mvis], backend=backend, dtype=dtype)
+        for backend in BACKENDS
+        for dtype in DTYPES
+    }
+    pairs = directions(rng)
+    for _ in range(geometries):
+        light, view = next(pairs)
+        printed = prints(model, light, view, prints_each, rng)
+        pixels = np.concatenate([printed, anything(printed.shape[1], anything_each, rng)])
+        env = variables(light, view)
+        found = {key: transform.with_env(env)(pixels) for key, transform in transforms.items()}
+        yield Look(model, light, view, pixels, prints_each, found)
+
+
+# The papers' equations, letter by letter --------------------------------------------------------------------
+
+
+def literal(model: str, pixels: Pixels, light: Array, view: Array) -> Pixels:
+    """XYZ (n, 3) by the equations as printed, in float32, on vectors that are scaled to length 1 first.
+
+    Black where light or viewer are not above the surface, as no formula can be expected to know.
+    """
+    names = MODELS[model].channels
+    with np.errstate(all="ignore"):
+        n, i, v = (unit(np.asarray(a, np.float32)) for a in (pixels[:, -3:], light, view))  # type: ignore[arg-type]
+        h = unit(i + v)
+        cos_i, cos_v, cos_h = (np.sum(n * a, axis=1, keepdims=True) for a in (i, v, h))
+        cos_alpha = np.sum(v * h)
+        diffuse = pixels[:, :3]
+        ks = pixels[:, [k for k, name in enumerate(names) if name.startswith("ks")]]
+        m = pixels[:, [k for k, name in enumerate(names) if name.startswith("m")]]
+        theta_h = np.arccos(cos_h)
+        pi = np.float32(np.pi)
+        if model == "ward":
+            lobe = np.exp(-(np.tan(theta_h) ** 2) / m**2) / (4 * pi * m**2 * np.sqrt(cos_i * cos_v))
+            XYZ = pi * cos_i * (diffuse / pi + ks * lobe)
+        else:
+            D = np.exp(-((np.tan(theta_h) / m) ** 2)) / (m**2 * np.cos(theta_h) ** 4)
+            shadowed = 2 * cos_h * np.minimum(cos_i, cos_v) / cos_alpha
+            facets = D * np.minimum(1, shadowed) / (pi * cos_i * cos_v)
+            if model == "cook_torrance_2020":
+                XYZ = cos_i * (ks * facets + (1 - ks) * diffuse)
+            else:
+                R0 = np.float32(0.04)
+                F = R0 + (1 - R0) * (1 - cos_i) ** 5
+                XYZ = pi * cos_i * (diffuse / pi + ks * F * facets)
+        return np.where((cos_i > 0) & (cos_v > 0), XYZ, np.float32(0))
