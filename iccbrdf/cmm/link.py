@@ -7,7 +7,7 @@ viewing conditions, rendering intents choose among the tags.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -15,11 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from iccbrdf.cmm.arrange import arranged, without_decoding
+from iccbrdf.cmm.effects import Choice, choice, substitution
 from iccbrdf.cmm.environment import checked_environment
 from iccbrdf.cmm.execution import BACKENDS
 from iccbrdf.cmm.join import join, media_white
 from iccbrdf.cmm.resolve import INTERPOLATIONS
-from iccbrdf.cmm.stages import INTENTS, stages
+from iccbrdf.cmm.stages import INTENTS, Stage, stages
 from iccbrdf.cmm.steps import Process, Step
 from iccbrdf.cmm.transform import Transform
 from iccbrdf.errors import UsageError, nearest
@@ -40,6 +41,8 @@ def link(
     samples: str = "device",
     interpolation: str = "multilinear",
     spectral: bool = True,
+    effects: str | Collection[str] = "full",
+    without: Collection[str] = (),
 ) -> Transform:
     """Link v5 profiles, paths or objects, into one transform.
 
@@ -72,6 +75,14 @@ def link(
     spectral
         Whether profiles that have both take spectra rather than colours to their neighbours, as ICC's own CMM
         does; the results of a last one are spectra then.
+    effects
+        `full`: every pixel runs the whole chain.  `auto`: tiles that have little in them, such as flat or
+        matte ones, run only what they call for.  The numbers are the same but for the sign of zeros, or
+        where a function other than + - * / and a root takes nothing but constant channels, to a few units in
+        the last place.  Or names of effects (`relief`, `specular`, `chromatic-specular`,
+        `chromatic-roughness`): the others of these four are left out.
+    without
+        Names of effects, of these four, to leave out: their multiplex channels take values that do nothing.
 
     Raises
     ------
@@ -105,6 +116,9 @@ def link(
     ):
         if value not in valid:
             raise UsageError(f"{what} {value!r} is unknown: {nearest(str(value), valid)}")
+    if isinstance(without, str) or not all(isinstance(name, str) for name in (*effects, *without)):
+        raise UsageError(f"effects: found {effects!r} without {without!r}, expected names")
+    chosen = choice(effects, without)
     number_type = _number_type(dtype)
 
     absolute = intent == "absolute"
@@ -116,9 +130,10 @@ def link(
         steps, first = arranged(first, tuple(channels))
     if first.source.kind == "pcs":
         steps += media_white(first, absolute, outward=False)
-    steps.append(first.step(interpolation))
+    steps += [*_without(chosen, first), first.step(interpolation)]
     for before, after in pairwise([first, *others]):
-        steps += [*join(before, after, absolute=absolute), after.step(interpolation)]
+        steps += join(before, after, absolute=absolute)
+        steps += [*_without(chosen, after), after.step(interpolation)]
     last = others[-1] if others else first
     if last.destination.kind == "pcs":
         steps += media_white(last, absolute, outward=True)
@@ -134,11 +149,18 @@ def link(
         dtype=number_type,
         wanted=backend,
         threads=int(threads),
+        adaptive=chosen.adaptive,
     )
     if backend != "auto":
         # Asked for by name: whether it can run is said now, not with the first pixel.
         _ = transform.execution
     return transform
+
+
+def _without(chosen: Choice, stage: Stage) -> list[Step]:
+    """What leaves out effects of the channels that a stage starts from."""
+    step = substitution(stage.source.names, chosen.left_out) if stage.source.kind == "mcs" else None
+    return [] if step is None else [step]
 
 
 def _number_type(dtype: npt.DTypeLike) -> type[np.floating[Any]]:

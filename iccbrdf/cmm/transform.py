@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -10,8 +11,9 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from iccbrdf.cmm.adaptive import adaptive_execution
 from iccbrdf.cmm.environment import checked_environment
-from iccbrdf.cmm.execution import Execution, execution, parts
+from iccbrdf.cmm.execution import Execution, Tally, execution, parts
 from iccbrdf.cmm.steps import Step
 from iccbrdf.errors import InputError
 
@@ -38,11 +40,16 @@ class Transform:
     wanted: str
     """The back end that was asked for; `backend` is the one that runs."""
     threads: int
+    adaptive: bool = False
+    """Whether each tile runs as little of the chain as it calls for (cmm/adaptive.py)."""
 
     @property
     def execution(self) -> Execution:
         """What runs the chain, compiled when first asked for."""
-        return execution(self.steps, len(self.channels_in), np.dtype(self.dtype), self.wanted)
+        dtype = np.dtype(self.dtype)
+        if self.adaptive:
+            return adaptive_execution(self.steps, self.channels_in, dtype, self.wanted)
+        return execution(self.steps, len(self.channels_in), dtype, self.wanted)
 
     @property
     def backend(self) -> str:
@@ -54,6 +61,13 @@ class Transform:
 
         Integers are taken as the numbers that they are: 255 is not 1.  Raises InputError where the array
         holds no real numbers or the channels do not fit.
+        """
+        return self.tallied(array)[0]
+
+    def tallied(self, array: npt.ArrayLike) -> tuple[npt.NDArray[np.floating[Any]], Tally]:
+        """As a call; and the number of pixels by the kind of tile that they ran in.
+
+        Kinds other than `full` and `not finite` are those of an adaptive transform.
         """
         try:
             pixels = np.asarray(array)
@@ -70,18 +84,18 @@ class Transform:
         out = np.empty((len(flat), len(self.channels_out)), self.dtype)
         run = self.execution.bind(self.env)
 
-        def quietly(piece: slice) -> None:
+        def quietly(piece: slice) -> Tally:
             # What is infinite or not a number is a result like any other.
             with np.errstate(all="ignore"):
-                run(flat[piece], out[piece])
+                return run(flat[piece], out[piece])
 
         pieces = parts(len(flat), self.threads)
         if self.threads > 1 and len(pieces) > 1:
             with ThreadPoolExecutor(self.threads) as pool:
-                list(pool.map(quietly, pieces))
+                tally = sum(pool.map(quietly, pieces), start=Counter[str]())
         else:
-            quietly(slice(None))
-        return out.reshape(*pixels.shape[:-1], len(self.channels_out))
+            tally = quietly(slice(None))
+        return out.reshape(*pixels.shape[:-1], len(self.channels_out)), tally
 
     def with_env(self, env: Mapping[str, float]) -> Transform:
         """The same chain under other run-time variables; those not named keep their value."""
