@@ -7,19 +7,23 @@ float64 computes from them is what float32 is measured against.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.util import find_spec
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import iccbrdf
+from iccbrdf.brdf.interpolation import interpolate
 from iccbrdf.brdf.models import MODELS
-from iccbrdf.brdf.primaries import Primaries, Primary
+from iccbrdf.brdf.primaries import Primaries, Primary, read_primaries
+from iccbrdf.brdf.slopes import Slope, Slopes, read_slopes, slope_adjust, slope_angle
 from iccbrdf.build import build_pair
 from iccbrdf.icc import Profile
+from iccbrdf.resources import folder
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.float32]
@@ -239,6 +243,83 @@ def relative_error(found: NDArray[np.floating], expected: Array) -> Array:
         error = np.abs(found - expected) / np.abs(expected)
     error = np.where(found == expected, 0.0, error)
     return np.asarray(np.nan_to_num(error, nan=np.inf))
+
+
+# Colours ----------------------------------------------------------------------------------------------------
+
+COLOUR_MIDS = (("smooth", "affine"), ("smooth", "published"), ("published", "published"))
+"""Interpolation and slope adjustment."""
+
+EXAMPLE = folder("profiles") / "fogra39_gloss"
+
+
+def held(values: ArrayLike) -> tuple[float, ...]:
+    """Numbers as a program holds them."""
+    return tuple(np.asarray(values, np.float32).astype(np.float64).tolist())
+
+
+def _held_primaries() -> Primaries:
+    example = read_primaries(EXAMPLE / "primaries.json")
+    entries = (replace(e, XYZ=held(e.XYZ), parameters=held(e.parameters)) for e in example.primaries)
+    return replace(example, white=held(example.white), primaries=tuple(entries))
+
+
+def _held_slopes() -> Slopes:
+    example = read_slopes(EXAMPLE / "slopes.json")
+    return replace(example, slopes=tuple(Slope(s.angle, held(s.W), held(s.B)) for s in example.slopes))
+
+
+PRIMARIES, SLOPES = _held_primaries(), _held_slopes()
+
+
+def colours(count: int, rng: np.random.Generator) -> Pixels:
+    """XYZ and normals (count, 6): in and out of every range, on nodes, ties, ends and segment boundaries."""
+    nodes, white = PRIMARIES.XYZ, np.array(PRIMARIES.white)
+    one, other = nodes[rng.integers(0, len(nodes), (2, count))]
+    share = rng.uniform(0, 1, (count, 1))
+    ends = np.concatenate([SLOPES.W, SLOPES.B, [white]])[rng.integers(0, 2 * len(SLOPES.W) + 1, count)]
+    of_one_sum = one / one.sum(axis=1, keepdims=True) + other / other.sum(axis=1, keepdims=True)
+    kinds = [
+        share * one + (1 - share) * other,
+        rng.dirichlet(np.full(len(nodes), 0.5), count) @ nodes,
+        rng.uniform(-8, 8, (count, 3)),
+        rng.uniform(0, 1, (count, 3)) ** 3,
+        one,
+        np.nextafter(one.astype(np.float32), np.float32(rng.choice([-1, 1]))),
+        ends,
+        share * of_one_sum,  # as near in chromaticity to the one as to the other
+        share * white,
+        rng.choice([0.0, 0.0, 1e-45, 1e-20, -1e-3, 1e-5, 8, -8], (count, 3)),
+    ]
+    XYZ = np.choose(rng.integers(0, len(kinds), (count, 1)), kinds)
+    angles = np.select(
+        [rng.random(count) < 0.5],
+        [rng.choice([*SLOPES.angles, 89.9, 90, 135, 180], count)],
+        rng.uniform(0, 180),
+    )
+    n = _at_cosine(np.array([0, 0, 1.0]), np.cos(np.radians(angles)), rng)
+    n = np.where(rng.random((count, 1)) < 0.1, rng.uniform(-4, 4, (count, 3)), n)
+    n = np.where(rng.random((count, 1)) < 0.05, 0, n * 10 ** rng.uniform(-1, 0.6, (count, 1)))
+    return np.concatenate([XYZ, n], axis=1).astype(np.float32)
+
+
+def on_slopes(pixels: Pixels, slope_method: str) -> Array:
+    """The reference's XYZ of colours (n, 6) on their slopes."""
+    XYZ, n = np.split(pixels.astype(np.float64), 2, axis=1)
+    return slope_adjust(XYZ, slope_angle(n), SLOPES, method=slope_method)  # type: ignore[arg-type]
+
+
+def is_beside_switch(XYZ: Array) -> NDArray[np.bool_]:
+    """Where a rounding error may move the published interpolation's choice of nodes, (n).
+
+    That is also where X + Y + Z nearly cancels, of a colour that cannot be: it has no steady chromaticity.
+    """
+    here = interpolate(XYZ, PRIMARIES, method="published")
+    nudges = 1e-5 * np.array(list(product((-1, 1), repeat=3)))
+    moved = (interpolate(XYZ + nudge * (abs(XYZ) + 0.01), PRIMARIES, method="published") for nudge in nudges)
+    changes = [np.max(abs(there - here) / (abs(here) + 0.01), axis=1) for there in moved]
+    cancels = abs(np.sum(XYZ, axis=1)) < 1e-3 * np.sum(abs(XYZ), axis=1)
+    return cancels | (np.max(changes, axis=0) > 1e-3)
 
 
 # All of it by every back end --------------------------------------------------------------------------------

@@ -166,6 +166,13 @@ def _check_slopes(primaries: Primaries, slopes: Slopes) -> None:
         found, expected = getattr(slopes, what), getattr(primaries, what)
         if found != expected:
             raise InputError(f"{file}: {what}: found {found!r}, expected that of the primaries, {expected!r}")
+    for slope in slopes.slopes:
+        # The adjustment divides by the difference on the flat.
+        if not all(W > B for W, B in zip(slope.W, slope.B, strict=True)):
+            raise InputError(
+                f"{file}: slope {slope.angle:g}: white {slope.W}, black {slope.B}: expected the white above "
+                "the black in each of X, Y, Z"
+            )
 
 
 def _nodes(primaries: Primaries, interpolation: str, p: float, exponent: float, used: int) -> dict[str, Any]:
