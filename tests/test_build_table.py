@@ -381,7 +381,7 @@ def test_same_bytes_every_time(build):
 
 @pytest.mark.parametrize("build", [build_table_profile, build_table_mid])
 def test_what_cannot_be_built(build):
-    with pytest.raises(UsageError, match="grid is 16, expected 17, 33, 65"):
+    with pytest.raises(UsageError, match="grid is 16, expected 9, 17, 33, 65"):
         build(PRIMARIES, grid=16)
     with pytest.raises(UsageError, match="did you mean 'smooth'"):
         build(PRIMARIES, method="smoth", grid=17)

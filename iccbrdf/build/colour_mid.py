@@ -24,9 +24,10 @@ from iccbrdf.build.effects import chosen_effects, effect_names
 from iccbrdf.build.models import MODELS
 from iccbrdf.build.private_tags import IMAGE_TAG, SLOPES_TAG, image_encoding
 from iccbrdf.build.profiles import decoding, device_channels, ranges, text_tags
+from iccbrdf.build.slope_adjustment import TEMPLATE, check_slopes, slope_constants
 from iccbrdf.calc import Compiled, compile_chain
 from iccbrdf.calc import listing as program_listing
-from iccbrdf.errors import InputError, UsageError, nearest
+from iccbrdf.errors import UsageError, nearest
 from iccbrdf.icc import Calculator, ColorantTable, Header, MultiProcess, NumberArray, Profile
 from iccbrdf.resources import folder
 
@@ -113,7 +114,7 @@ def build_colour_mid(
         raise UsageError(f"p {p:g}, exponent {exponent:g}: expected p in 1..8, exponent in -4..4 and not 0")
     check_nodes(primaries)
     if slopes is not None:
-        _check_slopes(primaries, slopes)
+        check_slopes(primaries, slopes)
     if slopes is None and effects is not None and "slope" in effect_names(effects):
         raise UsageError("the effect 'slope' is asked for, but there are no slopes, which it needs")
     chosen = chosen_effects(primaries.model, effects, without)
@@ -136,13 +137,8 @@ def build_colour_mid(
             "gloss": parameters[3 : max(used, 4)],
         }
     if slopes is not None:
-        names.insert(0, "slope_adjust.calc")
-        constants |= {
-            "slope_angles": slopes.angles,
-            "slope_W": slopes.W,
-            "slope_B": slopes.B,
-            "slope_method": slope_method,
-        }
+        names.insert(0, TEMPLATE)
+        constants |= slope_constants(slopes, slope_method)
     templates = folder("calc_templates")
     texts = [((templates / name).read_text(encoding="utf-8"), name) for name in names]
     switches = {name: chosen[name] for name in ("specular", "relief")}
@@ -156,23 +152,6 @@ def build_colour_mid(
         compiled=compiled,
         effects={"slope": slopes is not None, "interpolation": chosen["interpolation"]},
     )
-
-
-def _check_slopes(primaries: Primaries, slopes: Slopes) -> None:
-    file = slopes.file or "slopes"
-    if len(slopes.slopes) < 2:
-        raise InputError(f"{file}: found the flat print alone, expected at least one slope beside it")
-    for what in ("illuminant", "observer"):
-        found, expected = getattr(slopes, what), getattr(primaries, what)
-        if found != expected:
-            raise InputError(f"{file}: {what}: found {found!r}, expected that of the primaries, {expected!r}")
-    for slope in slopes.slopes:
-        # The adjustment divides by the difference on the flat.
-        if not all(W > B for W, B in zip(slope.W, slope.B, strict=True)):
-            raise InputError(
-                f"{file}: slope {slope.angle:g}: white {slope.W}, black {slope.B}: expected the white above "
-                "the black in each of X, Y, Z"
-            )
 
 
 def _nodes(primaries: Primaries, interpolation: str, p: float, exponent: float, used: int) -> dict[str, Any]:

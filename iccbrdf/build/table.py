@@ -21,11 +21,13 @@ from iccbrdf.brdf.geometry import Array
 from iccbrdf.brdf.interpolation import InterpolationMethod, interpolate
 from iccbrdf.brdf.models import NORMAL, find_model
 from iccbrdf.brdf.primaries import Primaries
+from iccbrdf.brdf.slopes import Slopes
 from iccbrdf.brdf.smooth_interpolation import DIFFUSE, GLOSS, GLOSS_FLOOR, KNEE
 from iccbrdf.build.models import MODELS
 from iccbrdf.build.power import Power, cube, near_exponential, quantised, root
-from iccbrdf.build.private_tags import IMAGE_TAG, image_encoding
+from iccbrdf.build.private_tags import IMAGE_TAG, SLOPES_TAG, image_encoding
 from iccbrdf.build.profiles import COPYRIGHT, decoding, ranges, text_tags
+from iccbrdf.build.slope_adjustment import check_slopes, slope_adjustment
 from iccbrdf.build.table_error import TableError, measure
 from iccbrdf.build.viewing import viewing
 from iccbrdf.calc.elements import apply
@@ -52,7 +54,7 @@ from iccbrdf.icc import (
     SegmentedCurve,
 )
 
-GRIDS = (17, 33, 65)
+GRIDS = (9, 17, 33, 65)
 """Points an axis."""
 
 HEADROOM = 1.1
@@ -87,10 +89,19 @@ class Tables:
         }
 
 
-def build_tables(primaries: Primaries, *, method: InterpolationMethod = "smooth", grid: int = 33) -> Tables:
+def build_tables(
+    primaries: Primaries,
+    *,
+    method: InterpolationMethod = "smooth",
+    grid: int = 33,
+    slopes: Slopes | None = None,
+    slope_method: str = "affine",
+) -> Tables:
     """Build `build_table_profile` and `build_table_mid`, which see."""
     profile, profile_error = build_table_profile(primaries, method=method, grid=grid)
-    mid, mid_error = build_table_mid(primaries, method=method, grid=grid)
+    mid, mid_error = build_table_mid(
+        primaries, method=method, grid=grid, slopes=slopes, slope_method=slope_method
+    )
     return Tables(profile, mid, (profile_error, mid_error))
 
 
@@ -108,9 +119,14 @@ class _Nodes:
 
 
 def build_table_mid(
-    primaries: Primaries, *, method: InterpolationMethod = "smooth", grid: int = 33
+    primaries: Primaries,
+    *,
+    method: InterpolationMethod = "smooth",
+    grid: int = 33,
+    slopes: Slopes | None = None,
+    slope_method: str = "affine",
 ) -> tuple[Profile, TableError]:
-    """Build the MID that looks the parameters up, and measure it.
+    """Build the MID that looks the parameters up, and measure it on the flat print.
 
     Its device channels are X, Y, Z, n.x, n.y, n.z, encoded as those of the colour MID; kd follows XYZ beyond
     the end of the table too.
@@ -123,14 +139,18 @@ def build_table_mid(
         `smooth` or `published`; the latter jumps, and no table comes near to it everywhere.
     grid
         One of `GRIDS`.
+    slopes, slope_method
+        As of `build_colour_mid`: a program adjusts XYZ to the slope before it is looked up.
 
     Raises
     ------
     InputError
-        Nodes too few, too many or too close.
+        Nodes too few, too many or too close; slopes measured under other conditions than the primaries.
     UsageError
         An unknown method or grid.
     """
+    if slopes is not None:
+        check_slopes(primaries, slopes)
     nodes = _nodes(primaries, method, grid)
     names = find_model(primaries.model).channels
     k = len(names)
@@ -142,6 +162,7 @@ def build_table_mid(
     )
     elements = (Matrix.of(np.diag(nodes.scale)), CurveSet((nodes.axis.clipped,) * 3), Clut(table))
     calculator = Calculator(6, k + 3, program, elements)
+    adjustment = [] if slopes is None else [slope_adjustment(slopes, slope_method)]
     channels_in, channels_out = (*"XYZ", *NORMAL), (*names, *NORMAL)
     profile = Profile(
         Header(device_class="mid ", colour_space="nc0006", mcs=f"mc{k + 3:04x}"),
@@ -149,7 +170,10 @@ def build_table_mid(
             **text_tags(f"Colour MID for {_title(primaries, method, grid)}", channels_out),
             "clrt": ColorantTable.of(channels_in),
             IMAGE_TAG: image_encoding(channels_out, primaries),
-            "A2M0": MultiProcess.of(decoding(channels_in, ranges(channels_in, {}), channels_in), calculator),
+            **({} if slopes is None else {SLOPES_TAG: NumberArray("fl32", slopes.angles)}),
+            "A2M0": MultiProcess.of(
+                decoding(channels_in, ranges(channels_in, {}), channels_in), *adjustment, calculator
+            ),
         },
     )
 
