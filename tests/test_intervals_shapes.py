@@ -136,9 +136,9 @@ SHAPES = (
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("first", range(0, 300, 100))
+@pytest.mark.parametrize("first", range(0, 30, 10))
 def test_random_shapes_are_contained(first, dtype):
-    for seed in range(first, first + 100):
+    for seed in range(first, first + 10):
         made = RandomGraph(seed, dtype)
         for _ in range(14):
             made.grow()

@@ -70,14 +70,18 @@ _DOMAINS: Mapping[str, str] = {
 def _up(value: float) -> str:
     """Not less than `value`, in one digit."""
     exponent = math.floor(math.log10(value))
-    digit = math.ceil(value / 10.0**exponent * (1 - 1e-12))
-    return f"{digit * 10.0**exponent:.0e}".replace("e-0", "e-").replace("e+0", "e").replace("e+", "e")
+    return _literal(math.ceil(value / 10.0**exponent * (1 - 1e-12)), exponent)
 
 
 def _down(value: float) -> str:
     """Not more than `value`, in two digits."""
     exponent = math.floor(math.log10(value)) - 1
-    return f"{math.floor(value / 10.0**exponent) * 10.0**exponent:.2g}".replace("e+", "e")
+    return _literal(math.floor(value / 10.0**exponent * (1 + 1e-12)), exponent)
+
+
+def _literal(digits: int, exponent: int) -> str:
+    mantissa, _, power = f"{digits * 10.0**exponent:.2g}".partition("e")
+    return f"{mantissa}e{int(power)}" if power else mantissa
 
 
 def _away_from_zero(a: Arithmetic, dividend: Interval, divisor: Interval) -> str:

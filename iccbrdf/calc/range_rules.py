@@ -150,6 +150,9 @@ class Shapes:
         if value != EITHER:
             return value
         left, right = node.arguments
+        if left is right:
+            holds = node.op in ("eq", "le", "ge")
+            return value if self.known(left).nan else TRUE if holds else FALSE
         if node.op in ("le", "gt") and self.ordered(left, right):
             return TRUE if node.op == "le" else FALSE
         if node.op in ("ge", "lt") and self.ordered(right, left):
@@ -161,7 +164,7 @@ _RULES: Mapping[str, Callable[[Shapes, Node, Interval], Interval]] = {
     "div": Shapes.quotient,
     "add": Shapes.total,
     "sub": Shapes.difference,
-    **dict.fromkeys(("le", "lt", "ge", "gt"), Shapes.comparison),
+    **dict.fromkeys(COMPARISONS, Shapes.comparison),
 }
 
 
@@ -251,6 +254,11 @@ def consequences(arithmetic: Arithmetic, node: Node, value: Interval, known: Kno
         yield from _CONSEQUENCES[node.op](arithmetic, node, value, known)
 
 
+def two_sided(node: Node) -> bool:
+    """Whether the value may say that an operand is not in the middle of its range, which is no interval."""
+    return node.op in ("abs", "mul", "eq", "neq")
+
+
 _INVERSE = {"lt": "ge", "le": "gt", "gt": "le", "ge": "lt", "eq": "neq", "neq": "eq"}
 _MIRRORED = {"gt": "lt", "ge": "le"}
 
@@ -284,7 +292,7 @@ def _lower_cut(a: Arithmetic, op: str, limit: Interval, value: Interval) -> Inte
 def _equality_cut(a: Arithmetic, op: str, limit: Interval, value: Interval) -> Interval | None:
     if op == "eq":
         return Interval(limit.low, limit.high)
-    if limit.low != limit.high or limit.low not in value[:2]:
+    if limit.low != limit.high:
         return None
     low = a.above(limit.low) if value.low == limit.low else value.low
     high = a.below(limit.low) if value.high == limit.low else value.high
@@ -317,13 +325,23 @@ def _of_negative(a: Arithmetic, node: Node, value: Interval, known: Known) -> It
 
 
 def _of_absolute(a: Arithmetic, node: Node, value: Interval, known: Known) -> Iterator[Fact]:
-    (operand,) = node.arguments
+    """|x| is at most the greatest value; if x has one sign for certain, at least the least."""
+    operand = node.arguments[0]
     x = known(operand)
     low, high = -value.high, value.high
     if value.low > 0:
         low = value.low if x.low > -value.low else low
         high = -value.low if x.high < value.low else high
     yield operand, Interval(low, high, value.nan)
+
+
+def _of_square(a: Arithmetic, node: Node, value: Interval, known: Known) -> Iterator[Fact]:
+    if node.arguments[0] is not node.arguments[1]:
+        return
+    slack = 4 * a.epsilon
+    least = math.sqrt(max(value.low - a.smallest, 0.0)) * (1 - slack)
+    most = math.sqrt(value.high + a.smallest) * (1 + slack) if value.high >= 0 else 0.0
+    yield from _of_absolute(a, node, a.rounded(least, most, value.nan, ulps=0), known)
 
 
 def _of_extreme(a: Arithmetic, node: Node, value: Interval, known: Known) -> Iterator[Fact]:
@@ -352,6 +370,7 @@ _CONSEQUENCES: Mapping[str, Callable[[Arithmetic, Node, Interval, Known], Iterat
     "rnum": _of_real,
     "neg": _of_negative,
     "abs": _of_absolute,
+    "mul": _of_square,
     "vmin": _of_extreme,
     "vmax": _of_extreme,
     "select": _of_select,

@@ -30,7 +30,7 @@ from iccbrdf.calc.intervals import (
     Interval,
     square,
 )
-from iccbrdf.calc.range_rules import Fact, Shapes, chain, consequences
+from iccbrdf.calc.range_rules import Fact, Shapes, chain, consequences, two_sided
 from iccbrdf.calc.table_ranges import curve_range, table_range
 
 Range: TypeAlias = tuple[float, float]
@@ -43,12 +43,14 @@ MAX_CONTEXTUAL = 10_000
 """Nodes of a graph up to which contexts are used; selects of larger ones may be either side, always."""
 MAX_EVALUATIONS = 100_000
 """Values computed in contexts, after which no new contexts are made."""
-MAX_TRIALS = 20_000
+MAX_TRIALS = 30_000
 """Values computed in proofs by cases, after which none is tried."""
-_MAX_TRIALS_EACH = 5_000
+_MAX_TRIALS_EACH = 10_000
 """The same for one operation."""
 _MAX_PIECES = 32
 """Pieces that a range is cut into."""
+_MAX_CONSEQUENCES = 200
+"""Facts that are drawn from an assumption."""
 _FEW = 4
 """Conditions and chains that cases are made of, for one operation."""
 _NUMBERS = 12
@@ -112,6 +114,8 @@ class _Context:
     facts: dict[Node, Interval] = field(default_factory=dict)
     mask: int = 0
     """A bit for each node of the facts."""
+    outer: int = 0
+    """The bits of all contexts around this one."""
     alike: dict[Node, Node] = field(default_factory=dict)
     """Least or greatest values, by the operand that they are equal to."""
     values: dict[Node, Interval] = field(default_factory=dict)
@@ -131,9 +135,10 @@ _Case: TypeAlias = "tuple[list[Fact], dict[Node, Node]]"
 
 @dataclass(frozen=True)
 class _Claim:
-    """That a node does not fail, or that it is not 0."""
+    """That a node does not fail, for which its `operand` may be to blame, or that it is not 0."""
 
     node: Node
+    operand: Node | None = None
     not_zero: bool = False
 
     def badness(self, value: Interval) -> float:
@@ -322,20 +327,30 @@ class _Analyser:
     ) -> _Context | None:
         """A context in which `facts` hold, and what follows from them; None where they contradict it."""
         inside = _Context(context, trial or context.trial, alike={**context.alike, **alike})
+
+        def known(node: Node) -> Interval:
+            return self.known(node, inside)
+
+        inside.outer = context.outer | context.mask
         pending = [(node, value, True) for node, value in facts]
-        while pending:
+        for _ in range(_MAX_CONSEQUENCES):
+            if not pending:
+                break
             node, value, certain = pending.pop()
-            before = self.known(node, inside)
+            before = known(node)
             value = before.meet(value)
             if is_truth(node):
                 value = Interval(math.ceil(value.low), math.floor(value.high)) if not value.empty else EMPTY
             if value.empty:
                 return None
-            if certain or value != before:
+            if value != before or (certain and node not in inside.facts):
                 inside.facts[node] = value
                 inside.mask |= self.bit[node]
-                found = consequences(self.arithmetic, node, value, lambda other: self.known(other, inside))
-                pending += ((other, where, False) for other, where in found)
+                # What is known of its users may now say more of their operands.
+                users = [user for user in self.users[node] if self.bit[user] & (inside.outer | inside.mask)]
+                for other in (node, *users):
+                    found = consequences(self.arithmetic, other, known(other), known)
+                    pending += ((operand, where, two_sided(other)) for operand, where in found)
         return inside
 
     # Proofs by cases -----------------------------------------------------------------------------------
@@ -352,7 +367,7 @@ class _Analyser:
         value = self.apply(node, arguments, context)
         remaining = hazard_of(self.arithmetic, node, arguments, value)
         if remaining is not None:
-            better = yield from self.by_cases(_Claim(node), context)
+            better = yield from self.by_cases(_Claim(node, remaining.operand), context)
             if better is not None:
                 return better
             self.hazards[node] = remaining
@@ -363,13 +378,13 @@ class _Analyser:
         if not self.contextual or (claim, context) in self.given_up or self.trials > self.allowed:
             return None
         # The search itself takes time, too.
-        self.trials += self.behind[claim.node].bit_count() // 8
+        self.trials += self.behind[claim.node].bit_count() // 16
         for cases in self.enumerated(claim.node, context, nested):
             value = yield from self.by_list(claim, cases, context, nested)
             if value is not None:
                 return value
         if not nested:
-            for node in self.numbers(claim.node, context):
+            for node in self.numbers(claim, context):
                 value = yield from self.by_pieces(claim, node, context)
                 if value is not None:
                     return value
@@ -461,13 +476,14 @@ class _Analyser:
             value = self.known(top, context)
             yield [([(top, value), (part, value)], {top: part}) for part in chain(top, top.op)]
 
-    def numbers(self, target: Node, context: _Context) -> list[Node]:
-        """Values in between that the target depends on in more than one way."""
+    def numbers(self, claim: _Claim, context: _Context) -> list[Node]:
+        """Values that the claim's node depends on in more than one way; its operand, if around 0."""
         found = []
-        for node in self.before(target):
+        for node in self.before(claim.node):
             value = self.known(node, context)
             divisible = not is_truth(node) and value.finite and value.low < value.high
-            if divisible and len(self.uses(node, target)) > 1:
+            around = node is claim.operand and value.low < 0 < value.high
+            if divisible and (around or len(self.uses(node, claim.node)) > 1):
                 found.append(node)
             if len(found) == _NUMBERS:
                 break
