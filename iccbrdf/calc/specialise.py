@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import statistics
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -55,13 +55,15 @@ def questions(graph: Graph, names: Sequence[str]) -> tuple[Question, ...]:
 
     names: of the input channels.  Those that only differ behind their dot are asked for together.
     """
+    read = {node.detail for node in graph.live() if node.op == "input"}
+    candidates = list(_candidates({i: name for i, name in enumerate(names) if i in read}))
     whole = work(graph, ())
     chosen: list[Question] = []
     kinds = {frozenset[Question](): whole}
     while len(chosen) < MAX_QUESTIONS:
         options = []
         asked = [question.channels for question in chosen]
-        for question in (each for each in _candidates(names) if each.channels not in asked):
+        for question in (each for each in candidates if each.channels not in asked):
             more = {kind | {question}: work(graph, kind | {question}) for kind in kinds}
             # Channels that are 0 are rarer than constant ones: to ask for that should be worth it.
             penalty = _LEAST_GAIN * whole if question.zero else 0.0
@@ -76,10 +78,10 @@ def questions(graph: Graph, names: Sequence[str]) -> tuple[Question, ...]:
     return tuple(chosen)
 
 
-def _candidates(names: Sequence[str]) -> Iterator[Question]:
+def _candidates(names: Mapping[int, str]) -> Iterator[Question]:
     families: dict[str, list[int]] = {}
-    plain = [i for i, name in enumerate(names) if "." not in name]
-    for i, name in enumerate(names):
+    plain = [i for i, name in names.items() if "." not in name]
+    for i, name in names.items():
         families.setdefault(name.rpartition(".")[0] or name, []).append(i)
     for family, channels in families.items():
         for zero in (False, True):
@@ -144,7 +146,7 @@ def _held(graph: Graph, yes: Collection[Question]) -> tuple[set[int], set[Node]]
     for question in yes:
         constant.update(question.channels)
         if question.zero:
-            zero.update(chains[i][-1] for i in question.channels if i in chains)
+            zero.update(chains[i][-1] for i in question.channels)
     return constant, zero
 
 

@@ -9,12 +9,28 @@ import click
 
 from iccbrdf import images
 from iccbrdf.build import image_link, last_slope
-from iccbrdf.cli.options import emit, environment, force_option, json_option, name_list, scene_options
-from iccbrdf.cli.pipeline import Output, arranged_channels, check_outputs, run, run_on_cluster
+from iccbrdf.cli.options import (
+    backend_option,
+    emit,
+    environment,
+    force_option,
+    json_option,
+    name_list,
+    scene_options,
+)
+from iccbrdf.cli.pipeline import (
+    EXR_SUFFIX,
+    Output,
+    arranged_channels,
+    check_outputs,
+    open_image,
+    run,
+    run_on_cluster,
+)
 from iccbrdf.cmm import INTENTS, link
 from iccbrdf.errors import UsageError
 from iccbrdf.icc import read_profile
-from iccbrdf.images import ImageSource, Samples, WithNormals, open_tiff, processors
+from iccbrdf.images import ImageSource, Samples, WithNormals, processors
 from iccbrdf.images.blocks import Array
 
 MOST_WORKERS = 8
@@ -34,6 +50,9 @@ Examples:
   Channels by name, for a TIFF from elsewhere:
     iccbrdf apply maps.tif -p mid.icc -p mvis.icc -o xyz.tif \\
       --channels kd.X,kd.Y,kd.Z,ks.X,ks.Y,ks.Z,m
+  Flat and matte tiles by less work; and how the print looks without its relief:
+    iccbrdf apply brdf.tif -p mid.icc -p mvis.icc -o proof.png --effects auto
+    iccbrdf apply brdf.tif -p mid.icc -p mvis.icc -o flat.png --without relief
   A large image on a dask cluster whose machines share these files:
     iccbrdf apply big.tif -p mid.icc -p mvis.icc -o xyz.tif --cluster tcp://10.0.0.5:8786
 """
@@ -58,14 +77,28 @@ def read_relief(
     return images.height_to_normals(images.read_height_map(height_map, relief), pitch)
 
 
+def _effects(effects: str | None, left_out: str | None) -> str | list[str]:
+    """What --effects asks for, as `link` takes it."""
+    if effects is None:
+        return "full" if left_out is None else "auto"
+    return effects if effects in ("auto", "full") else name_list(effects)
+
+
 @click.command("apply", epilog=EPILOG)
 @click.argument("image", type=click.Path(path_type=Path))
 @click.option("-p", "--profile", "profiles", multiple=True, required=True, type=click.Path(path_type=Path),
               help="A profile of the chain, in order: the MID, then the MVIS.")  # fmt: skip
 @click.option("-o", "--output", "outputs", multiple=True, required=True, type=click.Path(path_type=Path),
-              help="A file to write; repeatable.  .tif: what the chain gives, as real values (XYZ with Y = 1 "
-              "for white).  .png: a softproof in sRGB.")  # fmt: skip
+              help="A file to write; repeatable.  .tif, .exr: what the chain gives, as real values (XYZ with "
+              "Y = 1 for white).  .png: a softproof in sRGB.")  # fmt: skip
 @scene_options
+@click.option("--effects", metavar="auto|full|NAMES",
+              help="auto: tiles that are flat or matte, or have other channels constant, run only what they "
+              "call for, with the same result.  full: every pixel runs everything.  Or the names of those to "
+              "have of relief, specular, chromatic-specular and chromatic-roughness, separated by commas.  "
+              "Default: full, with --without auto.")  # fmt: skip
+@click.option("--without", "left_out", metavar="NAMES", help="Effects to leave out, of these four.")
+@backend_option
 @click.option("--intent", type=click.Choice(INTENTS), default="relative", show_default=True)
 @click.option("--samples", type=click.Choice(("device", "real")),
               help="What a float image holds, where it does not say so itself: device values 0..1, or real "
@@ -108,6 +141,9 @@ def command(
     light: str | None,
     view: str | None,
     env: tuple[str, ...],
+    effects: str | None,
+    left_out: str | None,
+    backend: str,
     intent: str,
     samples: Samples | None,
     channels: str | None,
@@ -127,7 +163,7 @@ def command(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Map IMAGE, a TIFF, through a chain of profiles.
+    """Map IMAGE, a TIFF or OpenEXR file, through a chain of profiles.
 
     The image holds the channels of the first profile, each encoded in 0..1, or their real values: for a MID
     of `iccbrdf build` the BRDF parameters and the normal, for a colour MID XYZ and the normal.  A colour MID
@@ -147,20 +183,25 @@ def command(
     variables = environment(light, view, env)
     if cluster is not None and (normal_map or height_map):
         raise UsageError("a cluster reads one image: leave --normals and --height out, or --cluster")
+    if cluster is not None and image.suffix.lower() == EXR_SUFFIX:
+        raise UsageError(f"a cluster reads TIFFs, whose blocks can be found one by one; found {image}")
     normals = read_relief(normal_map, green, height_map, relief, pitch)
-    with open_tiff(image, samples) as tiff:
+    with open_image(image, samples) as opened:
         declared = name_list(channels) if channels is not None else None
-        source: ImageSource = tiff
+        source: ImageSource = opened
         if normals is not None:
-            own = declared or tiff.names
-            if own is None or len(own) != tiff.channels:
-                raise UsageError(f"name the image's {tiff.channels} channels with --channels")
-            source, declared = WithNormals(tiff, own, normals), None
+            own = declared or opened.names
+            if own is None or len(own) != opened.channels:
+                raise UsageError(f"name the image's {opened.channels} channels with --channels")
+            source, declared = WithNormals(opened, own, normals), None
         settings: dict[str, Any] = {
             "env": variables,
             "intent": intent,
             "dtype": "float64" if double else "float32",
             "samples": source.samples,
+            "backend": backend,
+            "effects": _effects(effects, left_out),
+            "without": name_list(left_out or ""),
         }
         transform = link(chain, **settings)
         names = arranged_channels(source, transform.channels_in, declared)
@@ -183,6 +224,10 @@ def command(
             "intent": intent,
             "env": dict(transform.env),
             "backend": transform.backend,
+            "backend_reason": transform.execution.reason,
+            "effects": settings["effects"],
+            "without": settings["without"],
+            "kinds": dict(done.kinds),
             "not_finite_in": done.not_finite_in,
             "not_finite_out": done.not_finite_out,
             "beyond_slopes": done.beyond_slopes,
@@ -201,4 +246,7 @@ def command(
     for output in done.outputs:
         counts = [f"{n} {name.replace('_', ' ')}" for name, n in output.items() if name != "path" and n]
         text.append(f"  -> {output['path']}" + (f" ({', '.join(counts)})" if counts else ""))
+    if transform.adaptive and done.kinds:
+        shares = (f"{n / done.kinds.total():.0%} {kind}" for kind, n in done.kinds.most_common())
+        text.append(f"  tiles: {', '.join(shares)}")
     emit(as_json, "iccbrdf.apply/1", result, "\n".join(text))

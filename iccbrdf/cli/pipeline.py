@@ -8,21 +8,25 @@ writing overlap, and memory is that of some blocks, however large the image.
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from iccbrdf.cmm import Transform, standard_XYZ
+from iccbrdf.cmm import Tally, Transform, standard_XYZ
 from iccbrdf.errors import UsageError, nearest
 from iccbrdf.files import check_target
 from iccbrdf.icc import Profile
-from iccbrdf.images import ImageSource, Place, create_tiff, in_order
+from iccbrdf.images import ImageSource, Place, Samples, create_tiff, in_order, open_tiff
 from iccbrdf.images.checks import not_finite, steeper
 
 TIFF_SUFFIXES = (".tif", ".tiff")
 PNG_SUFFIX = ".png"
+EXR_SUFFIX = ".exr"
+
+_SUFFIXES = (*TIFF_SUFFIXES, PNG_SUFFIX, EXR_SUFFIX)
 
 SAMPLES_AT_A_TIME = 1 << 26
 """Blocks that are read at a time hold no more samples, unless one alone does, as a compressed segment may."""
@@ -32,7 +36,7 @@ _COLORIMETRIC = (("X", "Y", "Z"), ("L*", "a*", "b*"))
 
 @dataclass(frozen=True)
 class Output:
-    """A file to write: a TIFF of what the transform gives, or a PNG softproof, by its suffix."""
+    """A file to write, by its suffix: a TIFF or OpenEXR file of what the transform gives, a PNG softproof."""
 
     path: Path
     dtype: Literal["float32", "uint16"] = "float32"
@@ -50,6 +54,10 @@ class Output:
     def is_png(self) -> bool:
         return self.path.suffix.lower() == PNG_SUFFIX
 
+    @property
+    def is_exr(self) -> bool:
+        return self.path.suffix.lower() == EXR_SUFFIX
+
 
 class _Worked(NamedTuple):
     """What a worker made of a block: the blocks that the sinks will put, and what it met."""
@@ -59,6 +67,7 @@ class _Worked(NamedTuple):
     not_finite_in: int
     not_finite_out: int
     beyond_slopes: int
+    kinds: Tally
 
 
 @dataclass
@@ -72,6 +81,8 @@ class Done:
     """The same of the result."""
     beyond_slopes: int = 0
     """Pixels steeper than the last measured slope, which holds for them."""
+    kinds: Tally = field(default_factory=Counter)
+    """Pixels by the kind of tile that they ran in; nothing is counted on a cluster."""
 
 
 def check_outputs(outputs: Sequence[Output], *, overwrite: bool) -> None:
@@ -79,10 +90,8 @@ def check_outputs(outputs: Sequence[Output], *, overwrite: bool) -> None:
     seen = set()
     for output in outputs:
         suffix = output.path.suffix.lower()
-        if suffix not in (*TIFF_SUFFIXES, PNG_SUFFIX):
-            raise UsageError(
-                f"{output.path}: found suffix {suffix!r}, expected {', '.join((*TIFF_SUFFIXES, PNG_SUFFIX))}"
-            )
+        if suffix not in _SUFFIXES:
+            raise UsageError(f"{output.path}: found suffix {suffix!r}, expected {', '.join(_SUFFIXES)}")
         target = check_target(output.path, overwrite=overwrite)
         if target in seen:
             raise UsageError(f"{output.path}: is to be written twice")
@@ -129,7 +138,8 @@ def run(
 
         def work(place: Place) -> _Worked:
             block = source.read(place)
-            result = block._replace(data=transform(block.data))
+            data, kinds = transform.tallied(block.data)
+            result = block._replace(data=data)
             display = block._replace(data=to_display(result.data)) if to_display else result
             encoded = [
                 sink.encode(display if output.is_png else result)
@@ -141,6 +151,7 @@ def run(
                 not_finite_in=not_finite(block.data),
                 not_finite_out=not_finite(result.data),
                 beyond_slopes=steeper(block.data, source.samples, transform.channels_in, last_slope),
+                kinds=kinds,
             )
 
         def take(worked: _Worked) -> None:
@@ -148,6 +159,7 @@ def run(
                 sink.put(encoded)
             done.not_finite_in += worked.not_finite_in
             done.not_finite_out += worked.not_finite_out
+            done.kinds += worked.kinds
             done.beyond_slopes += worked.beyond_slopes
             advance(worked.pixels)
 
@@ -172,7 +184,7 @@ def run_on_cluster(
     """As `run`, on the machines of a cluster (`iccbrdf.cluster`), into one TIFF."""
     from iccbrdf.cluster import apply
 
-    if len(outputs) != 1 or outputs[0].is_png:
+    if len(outputs) != 1 or outputs[0].is_png or outputs[0].is_exr:
         raise UsageError("a cluster writes one TIFF; make pictures and copies of it")
     (output,) = outputs
     if output.compression:
@@ -204,6 +216,17 @@ def _open(output: Output, source: ImageSource, transform: Transform, overwrite: 
             exposure=output.exposure,
             overwrite=overwrite,
         )
+    if output.is_exr:
+        from iccbrdf.images.exr import create_exr
+
+        return create_exr(
+            output.path,
+            source.height,
+            source.width,
+            transform.channels_out,
+            samples=transform.samples_out,
+            overwrite=overwrite,
+        )
     return create_tiff(
         output.path,
         source.height,
@@ -216,6 +239,15 @@ def _open(output: Output, source: ImageSource, transform: Transform, overwrite: 
         overwrite=overwrite,
         workers=workers,
     )
+
+
+def open_image(path: Path, samples: Samples | None) -> AbstractContextManager[ImageSource]:
+    """An image to read: OpenEXR by its suffix, else TIFF."""
+    if path.suffix.lower() == EXR_SUFFIX:
+        from iccbrdf.images.exr import open_exr
+
+        return open_exr(path, samples)
+    return open_tiff(path, samples)
 
 
 @contextmanager

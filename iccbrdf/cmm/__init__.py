@@ -1,9 +1,9 @@
 """Profiles -> a Transform: routing by channel name, connection spaces and conditions, environment."""
 
-from iccbrdf.cmm.execution import BACKENDS
+from iccbrdf.cmm.execution import BACKENDS, Tally
 from iccbrdf.cmm.link import link
 from iccbrdf.cmm.stages import INTENTS
 from iccbrdf.cmm.standard import standard_XYZ
 from iccbrdf.cmm.transform import Transform
 
-__all__ = ["BACKENDS", "INTENTS", "Transform", "link", "standard_XYZ"]
+__all__ = ["BACKENDS", "INTENTS", "Tally", "Transform", "link", "standard_XYZ"]
