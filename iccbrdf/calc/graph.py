@@ -85,6 +85,8 @@ class Graph:
     """The type that constants are exact in, and are folded in."""
     shared: int = 0
     """How often an operator was asked for that was there already."""
+    moves: int = 0
+    """Values that programs moved while they were lifted into this graph."""
     _known: dict[tuple[Any, ...], Node] = field(default_factory=dict, repr=False)
 
     def add(self, op: str, arguments: Sequence[Node] = (), detail: Any = None, width: int = 0) -> Node:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any, TypeAlias
 
@@ -25,10 +25,12 @@ from iccbrdf.errors import UnsupportedError
 CONSTANTS = {"true": 1.0, "ndef": 0.0}
 """Run-time variables that are none: `env` gives each of them twice."""
 
-MAX_NODES = 100_000
-"""Nodes of a graph: a program that needs more is left to the interpreter."""
-MAX_MOVES = 1 << 24
+MAX_NODES = 20_000
+"""Nodes of a graph: a program that needs more is left to the interpreter, as it would compile for minutes."""
+MAX_MOVES = 1 << 21
 """Values moved while lifting: short programs can shuffle a deep stack for hours."""
+SAMPLED_AT_A_TIME = 128
+"""Operations of a calculator curve's samples that take the time of a move."""
 
 
 Origin: TypeAlias = "tuple[Any, int | None]"
@@ -78,7 +80,8 @@ class _Lift:
     graph: Graph
     finite_inputs: bool
     origins: dict[Node, Origin] | None
-    moves: int = 0
+    sampled: dict[int, SampledCurve] = field(default_factory=dict)
+    """The calculator curves met so far, by id, as their samples."""
 
     def element(self, element: Any, channels: Sequence[Node]) -> list[Node]:
         function = _ELEMENTS.get(element.signature)
@@ -112,8 +115,8 @@ class _Lift:
 
     def count(self, moved: int) -> None:
         """Account for values moved and nodes made."""
-        self.moves += moved + 1
-        if self.moves > MAX_MOVES or len(self.graph.nodes) > MAX_NODES:
+        self.graph.moves += moved + 1
+        if self.graph.moves > MAX_MOVES or len(self.graph.nodes) > MAX_NODES:
             raise UnsupportedError(f"its graph has more than {MAX_NODES} nodes, or takes too long to make")
 
 
@@ -159,16 +162,22 @@ class SampledCurve:
 
 def _curve_set(lift: _Lift, element: Any, channels: Sequence[Node]) -> list[Node]:
     pairs = zip(element.curves, channels, strict=True)
-    return [lift.graph.add("curve", [channel], _without_calculator(curve)) for curve, channel in pairs]
+    lift.count(len(element.curves))
+    return [lift.graph.add("curve", [channel], _without_calculator(lift, curve)) for curve, channel in pairs]
 
 
-def _without_calculator(curve: Any) -> Any:
+def _without_calculator(lift: _Lift, curve: Any) -> Any:
     """A calculator curve as its samples, any other curve as it is."""
     if curve.signature != "clcf":
         return curve
-    if any(checked.environment - CONSTANTS.keys() for checked in verify_element(curve.calculator)):
-        raise UnsupportedError("calculator curves that read run-time variables run in the interpreter alone")
-    return SampledCurve(curve.first, curve.last, curve.extension, calculator_samples(curve, {}))
+    if id(curve) not in lift.sampled:
+        (checked,) = verify_element(curve.calculator)
+        if checked.environment - CONSTANTS.keys():
+            raise UnsupportedError("calculator curves that read run-time variables run interpreted alone")
+        lift.count(curve.size * checked.work // SAMPLED_AT_A_TIME)
+        samples = calculator_samples(curve, {})
+        lift.sampled[id(curve)] = SampledCurve(curve.first, curve.last, curve.extension, samples)
+    return lift.sampled[id(curve)]
 
 
 def _table(lift: _Lift, element: Any, channels: Sequence[Node]) -> list[Node]:

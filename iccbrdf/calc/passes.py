@@ -15,6 +15,9 @@ from typing import TypeAlias
 
 from iccbrdf.calc.graph import Graph, Node, check, evaluate
 
+MAX_VISITS = 1 << 17
+"""Nodes that `optimise` looks at, each as often as it is looked at; programs of ours need a thousandth."""
+
 Rule: TypeAlias = Callable[[Graph, Node], Node | None]
 
 
@@ -218,7 +221,11 @@ def rewrite(graph: Graph, rules: Sequence[Rule]) -> tuple[Graph, Counter[str]]:
 
 
 def optimise(graph: Graph, passes: Passes = PASSES) -> tuple[Graph, tuple[Report, ...]]:
-    """Return the graph after all of `passes`, with no dead nodes, and one report for each pass."""
+    """Return the graph after all of `passes`, with no dead nodes, and one report for each pass.
+
+    Passes end early where they have looked at MAX_VISITS nodes: a program may be made so that each of them
+    finds one thing to do, as often as it has operators.
+    """
     check(graph)
     total, live, repeated = len(graph.nodes), len(graph.live()), graph.shared
     reports = [
@@ -226,10 +233,11 @@ def optimise(graph: Graph, passes: Passes = PASSES) -> tuple[Graph, tuple[Report
         Report("remove dead code", total, live, _counted("unused", total - live)),
     ]
     # Each pass runs until it and all others have found nothing to do since anything changed.
-    idle = 0
+    idle = visits = 0
     for name, rules in itertools.cycle(passes):
-        if idle == len(passes):
+        if idle == len(passes) or visits > MAX_VISITS:
             break
+        visits += len(graph.nodes)
         rewritten, changes = rewrite(graph, rules)
         idle += 1
         if changes:

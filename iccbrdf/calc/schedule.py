@@ -52,7 +52,7 @@ class Schedule:
 
 LEAST_WORK = 16
 """Cost of the sides from which a branch is worth its test."""
-MAX_ARRANGED = 10_000
+MAX_ARRANGED = 3_000
 """Nodes up to which branches are looked for: the bits that say what is behind what grow with the square."""
 
 _COST = {

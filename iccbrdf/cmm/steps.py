@@ -15,9 +15,10 @@ from iccbrdf.calc.elements import SIGNATURES
 from iccbrdf.calc.elements import apply as apply_element
 from iccbrdf.calc.graph import Graph, Node
 from iccbrdf.calc.lift import lift_element
-from iccbrdf.calc.verify import verify_element
+from iccbrdf.calc.verify import MAX_WORK, Checked, verify_element
+from iccbrdf.calc.work import element_work
 from iccbrdf.cmm.environment import RESERVED
-from iccbrdf.errors import ProfileError, UnsupportedError, nearest
+from iccbrdf.errors import LimitError, ProfileError, UnsupportedError, nearest
 from iccbrdf.icc import MultiProcess
 
 Channel = Any
@@ -51,6 +52,9 @@ class Process:
     executed: int
     """Operators on the longest path of its programs."""
 
+    work: int
+    """Operators on single numbers that a pixel takes, those of other elements included (calc/work.py)."""
+
     @classmethod
     def checked(cls, process: MultiProcess, origin: str, resolve: Resolve | None = None) -> Process:
         """After the checks that make it safe to run: elements that are known here, sound programs.
@@ -60,18 +64,25 @@ class Process:
         """
         variables: set[str] = set()
         registers = process.inputs
-        executed = 0
+        executed = work = 0
         elements = []
+        known: dict[int, tuple[Checked, ...]] = {}
         for i, element in enumerate(process.elements):
             place = f"{origin}: element {i}"
-            programs = verify_element(element, where=f"{place} ({element.signature})")
+            # A tag may hold one element many times.
+            if id(element) not in known:
+                known[id(element)] = verify_element(element, where=f"{place} ({element.signature})")
+            programs = known[id(element)]
             elements.append(resolve(element, f"{place} ({element.signature})") if resolve else element)
             _check_runnable(elements[-1], place)
             variables.update(*(p.environment for p in programs))
             registers = max(registers, element.outputs, *(p.max_depth + p.temporaries for p in programs))
             executed += sum(p.executed for p in programs)
+            work += element_work(elements[-1], [p.work for p in programs])
+            if work > MAX_WORK:
+                raise LimitError(f"{place}: a pixel takes operations on more than {MAX_WORK} numbers")
         return cls(
-            origin, tuple(elements), tuple(sorted(variables.difference(RESERVED))), registers, executed
+            origin, tuple(elements), tuple(sorted(variables.difference(RESERVED))), registers, executed, work
         )
 
     def apply(self, channels: Sequence[Channel], env: Mapping[str, float], dtype: Any) -> list[Channel]:

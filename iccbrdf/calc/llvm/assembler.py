@@ -15,6 +15,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from iccbrdf.calc.llvm.target import Target
+from iccbrdf.errors import UnsupportedError
 
 
 class Type(NamedTuple):
@@ -145,6 +146,10 @@ class Value:
         return self._test("une" if self.type.is_real else "ne", other)
 
 
+MAX_INSTRUCTIONS = 30_000
+"""Of a function: LLVM takes seconds for so many; curves of a thousand segments need a hundred thousand."""
+
+
 @dataclass
 class Assembler:
     """A function that is being written: its instructions, the block that they go to, and what they need."""
@@ -163,8 +168,10 @@ class Assembler:
     _count: int = 0
 
     def fresh(self, stem: str = "") -> str:
-        """A new name."""
+        """A new name.  UnsupportedError where the function gets too long."""
         self._count += 1
+        if self._count > MAX_INSTRUCTIONS:
+            raise UnsupportedError(f"the program takes more than {MAX_INSTRUCTIONS} instructions of LLVM")
         return f"{stem}{self._count}"
 
     def append(self, type: Type, instruction: str) -> Value:

@@ -14,8 +14,8 @@ from iccbrdf.calc.llvm.target import Target, binding
 
 PROGRAMS_KEPT = 32
 """Compiled programs in memory; the least recently used one goes first."""
-LARGE = 1 << 20
-"""Characters of assembly, some 10,000 nodes, beyond which compiling takes less care: it is done in a quarter
+LARGE = 1 << 18
+"""Characters of assembly, some 3,000 nodes, beyond which compiling takes less care: it is done in a quarter
 of the time, and the code is a fifth slower."""
 
 _SIGNATURE = ctypes.CFUNCTYPE(

@@ -23,6 +23,8 @@ from iccbrdf.errors import UnsupportedError
 MOST_READ = 4096
 """Numbers of a look-up table that are read for a pixel (2^inputs corners times the outputs): code grows with
 them."""
+MAX_TABLES = 1 << 27
+"""Bytes of all tables, one that is read at several places counted for each: every one is converted."""
 
 
 class Tables:
@@ -31,13 +33,15 @@ class Tables:
     def __init__(self, code: Assembler) -> None:
         self.arrays: list[NDArray[Any]] = []
         self._code = code
+        self._bytes = 0
         self._known: dict[tuple[Any, ...], str] = {}
 
     def base(self, array: NDArray[Any]) -> str:
         """The address of a table, as a name in the function."""
         array = np.ascontiguousarray(array)
-        if array.size >= 2**31:
-            raise UnsupportedError(f"a table of {array.size} numbers, at most {2**31 - 1} with LLVM")
+        self._bytes += array.nbytes
+        if self._bytes > MAX_TABLES:
+            raise UnsupportedError(f"look-up tables of more than {MAX_TABLES} bytes")
         key = (array.dtype, array.size, array.tobytes())
         if key not in self._known:
             self._known[key] = f"%table{len(self.arrays)}"
