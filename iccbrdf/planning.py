@@ -26,38 +26,6 @@ from iccbrdf.images import ImageSource, Place
 
 
 @dataclass(frozen=True)
-class ScenePlan:
-    """What an image calls for under some lights and a view.
-
-    findings, decision: of each effect, and of all that are left out together.
-    is_colour: whether the image holds XYZ, for a colour MID, rather than parameters.
-    reference: XYZ of the colour whose gloss holds where interpolation is left out; None for a BRDF image.
-    executed: operators for a pixel, of all profiles of the chain together, of the reduced and the full ones.
-    seconds: spent on `reading` the image, on `decoding` it to parameters, and on `bounding`.
-    """
-
-    recipe: Recipe
-    findings: tuple[Finding, ...]
-    decision: Decision
-    tolerance: float
-    is_colour: bool
-    reference: tuple[float, ...] | None
-    executed: tuple[int, int]
-    seconds: Mapping[str, float]
-
-    def profiles(self, *, full: bool = False) -> Built:
-        """The profiles of what the scene calls for, or with all effects."""
-        without: tuple[str, ...] = () if full else self.decision.without
-        return _built(self.recipe, without, self.is_colour, self.reference, self._note(without))
-
-    def _note(self, without: Sequence[str]) -> str:
-        if not without:
-            return ""
-        loss = "no loss" if self.decision.exact else f"CIEDE2000 at most {self.decision.bound:.3g}"
-        return f", reduced for a scene: without {', '.join(without)} ({loss})"
-
-
-@dataclass(frozen=True)
 class Built:
     """The profiles for one kind of image."""
 
@@ -80,6 +48,28 @@ class Built:
         return self.pair.compiled.executed + (self.colour.compiled.executed if self.colour else 0)
 
 
+@dataclass(frozen=True)
+class ScenePlan:
+    """What an image calls for under some lights and a view.
+
+    findings, decision: of each effect, and of all that are left out together.
+    is_colour: whether the image holds XYZ, for a colour MID, rather than parameters.
+    names: its channels.
+    full, reduced: the profiles with all effects, and with those alone that the scene calls for.
+    seconds: spent on `reading` the image, on `decoding` it to parameters, and on `bounding`.
+    """
+
+    recipe: Recipe
+    findings: tuple[Finding, ...]
+    decision: Decision
+    tolerance: float
+    is_colour: bool
+    names: tuple[str, ...]
+    full: Built
+    reduced: Built
+    seconds: Mapping[str, float]
+
+
 def plan_image(
     source: ImageSource,
     recipe: Recipe,
@@ -88,6 +78,7 @@ def plan_image(
     *,
     tolerance: float = 0.0,
     env: Mapping[str, float] | None = None,
+    names: Sequence[str] | None = None,
 ) -> ScenePlan:
     """
     Plan which effects an image calls for.
@@ -104,47 +95,49 @@ def plan_image(
         CIEDE2000 that may be lost; 0: float32 rounding alone.
     env
         Further run-time variables (`litI`, `ambI`).
+    names
+        The image's channels, where it does not say them itself.
 
     Raises
     ------
     UsageError
         The channels fit neither kind of image.
     """
-    full = recipe.pair()
-    names = _names(source, full.compiled.inputs)
+    pair = recipe.pair()
+    names = _names(source, pair.compiled.inputs, names)
     is_colour = set("XYZ") <= set(names)
     places = list(source.places())
     seconds = {"reading": 0.0}
     first = _timed_read(source, places[0], seconds)
     reference = _mean_XYZ(first, names, source.samples) if is_colour else None
+
+    def made(without: Collection[str], note: str = "") -> Built:
+        # An angle for a term that is left out would be a contradiction.
+        less = replace(recipe, fresnel_angle=None) if "fresnel" in without else recipe
+        if not is_colour:
+            return Built(less.pair(without, device=pair.compiled.inputs, note=note), None)
+        colour = less.colour_mid(without, reference=reference, device=DEVICE, note=note)
+        return Built(less.pair(without, note=note) if without else pair, colour)
+
+    full = made(())
     decoders = {
-        way: _decoder(_built(recipe, sorted(way), is_colour, reference), names, source.samples)
-        for way in _ways(recipe, is_colour)
+        way: _decoder(made(way) if way else full, names, source.samples) for way in _ways(recipe, is_colour)
     }
-    planner = Planner(
-        recipe.reflection(env or {}),
-        decoders,
-        dict(zip(full.compiled.inputs, full.compiled.defaults, strict=True)),
-        lights,
-        view,
-        tolerance,
-    )
+    defaults = dict(zip(pair.compiled.inputs, pair.compiled.defaults, strict=True))
+    planner = Planner(recipe.reflection(env or {}), decoders, defaults, lights, view, tolerance)
     for place in places:
         data = first if place is places[0] else _timed_read(source, place, seconds)
         planner.look(place.y0, place.x0, data)
-
-    def executed(without: Collection[str]) -> int:
-        return _built(recipe, without, is_colour, reference).executed
-
-    decision = planner.decide(executed)
+    decision = planner.decide(lambda without: made(without).executed)
     return ScenePlan(
         recipe,
         planner.findings(decision),
         decision,
         tolerance,
         is_colour,
-        reference,
-        (executed(decision.without), executed(())),
+        names,
+        full,
+        made(decision.without, _note(decision)) if decision.without else full,
         {**seconds, **planner.seconds},
     )
 
@@ -154,21 +147,23 @@ class Check:
     """How far the reduced proof of an image is from the full one, both in float32.
 
     dE: the largest CIEDE2000; place: row and column of its pixel; relative: the largest difference of XYZ by
-    the larger of the two values, which tells rounding from loss.
+    the larger of the two values, which tells rounding from loss; scenes: how many sets of run-time variables
+    it was looked for under.
     """
 
     dE: float
     place: tuple[int, int]
     relative: float
+    scenes: int
 
 
 def check_image(source: ImageSource, plan: ScenePlan, environments: Sequence[Mapping[str, float]]) -> Check:
     """Run the image through the full and the reduced profiles, under each set of run-time variables."""
-    full, reduced = plan.profiles(full=True), plan.profiles()
-    names = _names(source, full.pair.compiled.inputs)
-    transforms = [link(built.chain, channels=names, samples=source.samples) for built in (full, reduced)]
+    transforms = [
+        link(built.chain, channels=plan.names, samples=source.samples) for built in (plan.full, plan.reduced)
+    ]
     white = plan.recipe.primaries.white
-    worst = Check(0.0, (0, 0), 0.0)
+    worst = Check(0.0, (0, 0), 0.0, len(environments))
     for place in source.places():
         data = source.read(place).data
         for env in environments:
@@ -180,7 +175,7 @@ def check_image(source: ImageSource, plan: ScenePlan, environments: Sequence[Map
             y, x = np.unravel_index(np.argmax(dE), dE.shape)
             relative = max(worst.relative, _relative(one, other))
             if dE[y, x] > worst.dE:
-                worst = Check(float(dE[y, x]), (place.y0 + int(y), place.x0 + int(x)), relative)
+                worst = Check(float(dE[y, x]), (place.y0 + int(y), place.x0 + int(x)), relative, worst.scenes)
             worst = replace(worst, relative=relative)
     return worst
 
@@ -199,10 +194,13 @@ def _relative(one: Samples, other: Samples) -> float:
     return float(np.max(ratio, where=~np.isnan(ratio), initial=0.0))
 
 
-def _names(source: ImageSource, own: Sequence[str]) -> tuple[str, ...]:
+def _names(source: ImageSource, own: Sequence[str], declared: Sequence[str] | None) -> tuple[str, ...]:
     """The channels of an image, which may go without names where their number is that of a MID's."""
-    if source.names is not None:
-        return tuple(source.names)
+    named = declared or source.names
+    if named is not None:
+        if len(named) != source.channels:
+            raise UsageError(f"{len(named)} channels are named, the image has {source.channels}")
+        return tuple(named)
     for names in (own, DEVICE):
         if source.channels == len(names):
             return tuple(names)
@@ -220,17 +218,9 @@ def _ways(recipe: Recipe, is_colour: bool) -> list[Way]:
     return ways if recipe.slopes is None else [*ways, *(way | {"slope"} for way in ways)]
 
 
-def _built(
-    recipe: Recipe,
-    without: Collection[str],
-    is_colour: bool,
-    reference: tuple[float, ...] | None,
-    note: str = "",
-) -> Built:
-    if not is_colour:
-        return Built(recipe.pair(without, whole=True, note=note), None)
-    colour = recipe.colour_mid(without, reference=reference, device=DEVICE, note=note)
-    return Built(recipe.pair(without, note=note), colour)
+def _note(decision: Decision) -> str:
+    loss = "no loss" if decision.exact else f"CIEDE2000 at most {decision.bound:.3g}"
+    return f", reduced for a scene: without {', '.join(decision.without)} ({loss})"
 
 
 def _decoder(built: Built, names: tuple[str, ...], samples: str) -> Decoder:

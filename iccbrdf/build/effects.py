@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 from iccbrdf.build.models import MODELS
@@ -108,6 +109,7 @@ def _known(name: str, valid: Collection[str], complaint: str) -> str:
     return found
 
 
+@cache
 def _switches(template: str) -> Collection[str]:
     text = (folder("calc_templates") / template).read_text(encoding="utf-8")
     return compile_template(text, filename=template).effects

@@ -35,14 +35,19 @@ from iccbrdf.build.bounds import (
 from iccbrdf.build.effects import EFFECTS, MVIS, model_effects
 from iccbrdf.build.spans import ONE, ZERO, Directions, Span, Vector
 
-LEVELS = (64, 8, 1)
+LEVELS = (64, 8, 2, 1)
 """Pixels along the sides of the cells that are judged at once: tiles, parts of those that fail, pixels."""
 
 CHUNK = 1 << 13
 """Cells that are judged at a time: their intermediate results stay in the processor's cache."""
 
 REFINE = 0.25
-"""The part of the tolerance from which on a cell is looked at more closely."""
+"""The part of the tolerance from which on a cell is looked at more closely, under few lights."""
+
+FEW_LIGHTS = 4
+
+EFFORT = 2
+"""Cells that are looked at, for each pixel of a block, before what is in doubt still counts as called for."""
 
 Way = frozenset[str]
 """The effects among relief, slope and interpolation that a way to the pixel leaves out."""
@@ -114,6 +119,11 @@ class _Question:
     place: tuple[int, int] | None = None
     light: str | None = None
 
+    @property
+    def finest(self) -> int:
+        """The last level that it is judged at: pixels do not matter where nothing is to be gained."""
+        return len(LEVELS) - (1 if self.effect is None or EFFECTS[self.effect].spares else 2)
+
     def note(self, change: Change, where: NDArray[np.bool_]) -> None:
         """Changes that are small enough, where they are."""
         self.bound = max(self.bound, float(np.max(change.dE, where=where, initial=0.0)))
@@ -122,7 +132,10 @@ class _Question:
 
 @dataclass(frozen=True)
 class _Pixels:
-    """A block's parameters, and the components of its unit normals; arrays (height, width)."""
+    """A block's parameters, and the components of its unit normals.
+
+    Arrays (height, width), or of no axis where all pixels have one value.
+    """
 
     columns: Columns
     normal: tuple[Array, Array, Array]
@@ -157,6 +170,8 @@ class Planner:
     ) -> None:
         self._reflection, self._decoders, self._defaults = reflection, dict(decoders), dict(defaults)
         self._lights, self._view, self._tolerance = lights, view, tolerance
+        self._refine = REFINE if len(lights) <= FEW_LIGHTS else 1.0
+        self._spent = 0
         self.seconds = {"decoding": 0.0, "bounding": 0.0}
         effects = [name for name in model_effects(reflection.model) if EFFECTS[name].program == MVIS]
         effects.remove("relief")
@@ -177,7 +192,8 @@ class Planner:
         ways = {FULL} | {question.way - RELIEF for question in open_now}
         pixels = {way: self._pixels(self._decoders[way], data) for way in ways}
         decoded = time.perf_counter()
-        block = _Block(y0, x0, pixels)
+        block = _Block(y0, x0, data.shape[:2], pixels)
+        self._spent = 0
         lights, cells = np.divmod(np.arange(len(self._lights) * block.count(0)), block.count(0))
         with np.errstate(all="ignore"):
             self._search(block, 0, lights, cells, open_now)
@@ -185,10 +201,9 @@ class Planner:
         self.seconds["bounding"] += time.perf_counter() - decoded
 
     def _pixels(self, decoder: Decoder, data: Samples) -> _Pixels:
-        values = np.asarray(decoder.decode(data), np.float64)
-        shape = values.shape[:2]
-        channels = {name: np.broadcast_to(value, shape) for name, value in self._defaults.items()}
-        channels |= dict(zip(decoder.names, np.moveaxis(values, -1, 0), strict=True))
+        values = np.ascontiguousarray(np.moveaxis(decoder.decode(data), -1, 0), np.float64)
+        channels = {name: np.array(value) for name, value in self._defaults.items()}
+        channels |= dict(zip(decoder.names, values, strict=True))
         x, y, z = (channels[name] for name in NORMAL)
         squares = x * x + y * y + z * z
         with np.errstate(all="ignore"):
@@ -201,35 +216,41 @@ class Planner:
         self, block: _Block, level: int, lights: Index, cells: Index, questions: list[_Question]
     ) -> None:
         """Judge `cells` of a level, each under one of `lights`; those that fail are searched more finely."""
-        last = level == len(LEVELS) - 1
-        limit = self._tolerance * (1 if last else REFINE)
         for start in range(0, len(cells), CHUNK):
             here = slice(start, start + CHUNK)
             failed = np.zeros(len(cells[here]), np.bool_)
-            unsure = []
+            unsure: list[tuple[_Question, Change]] = []
             for question, change in self._changes(block, level, lights[here], cells[here], questions):
-                worse = self._worse(change, limit)
+                last = level == question.finest
+                worse = self._worse(change, self._tolerance * (1 if last else self._refine))
                 question.note(change, ~worse)
-                if not worse.any():
-                    continue
-                if last:
-                    worst = int(np.argmax(np.where(worse, change.dE, -1)))
-                    self._call(question, float(change.dE[worst]))
-                    question.place = block.place(int(cells[here][worst]))
-                    question.light = self._lights.texts[lights[here][worst]]
-                else:
+                if last and worse.any():
+                    self._call(question, change, block, level, lights[here], cells[here])
+                elif worse.any():
                     failed |= worse
-                    unsure.append(question)
-            if unsure:
-                finer, parents = block.finer(level, cells[here][failed])
-                self._search(block, level + 1, lights[here][failed][parents], finer, unsure)
+                    unsure.append((question, change))
+            if not unsure:
+                continue
+            finer, parents = block.finer(level, cells[here][failed])
+            self._spent += len(finer)
+            if self._spent <= EFFORT * block.count(len(LEVELS) - 1):
+                asked = [question for question, _ in unsure]
+                self._search(block, level + 1, lights[here][failed][parents], finer, asked)
+            else:
+                for question, change in unsure:
+                    self._call(question, change, block, level, lights[here], cells[here])
 
     def _worse(self, change: Change, limit: float) -> NDArray[np.bool_]:
         return change.dE > limit if self._tolerance else ~change.exact
 
-    def _call(self, question: _Question, bound: float) -> None:
-        """The question is answered: no.  A way that is gone takes its questions with it."""
-        question.open, question.exact, question.bound = False, False, bound
+    def _call(
+        self, question: _Question, change: Change, block: _Block, level: int, lights: Index, cells: Index
+    ) -> None:
+        """The answer is no.  A way that is gone takes its questions with it."""
+        worst = int(np.argmax(np.where(change.exact, -1, change.dE)))
+        question.open, question.exact, question.bound = False, False, float(change.dE[worst])
+        question.place = block.place(level, int(cells[worst]))
+        question.light = self._lights.texts[lights[worst]]
         if question.effect is None:
             for other in self._questions:
                 other.open = other.open and other.way != question.way
@@ -338,13 +359,22 @@ def _at(span: Span, rows: Index) -> Span:
     return Span(low, low if span.hi is span.lo else span.hi[rows])
 
 
+def _joined(function: np.ufunc, values: Array, times: int) -> Array:
+    """So many neighbouring rows at a time as one by a function of two; the last ones may be fewer."""
+    joined: Array = values[::times].copy()
+    for first in range(1, times):
+        rows = values[first::times]
+        function(joined[: len(rows)], rows, out=joined[: len(rows)])
+    return joined
+
+
 class _Block:
     """A block of pixels, and the cells of each level that it is cut into, numbered row by row."""
 
-    def __init__(self, y0: int, x0: int, pixels: Mapping[Way, _Pixels]) -> None:
+    def __init__(self, y0: int, x0: int, shape: tuple[int, ...], pixels: Mapping[Way, _Pixels]) -> None:
         self.pixels = pixels
         self._corner = y0, x0
-        self._shape = pixels[FULL].normal[0].shape
+        self._shape = shape
         self._spans: dict[tuple[int, int], Span] = {}
         self._off: dict[Way, Columns] = {}
 
@@ -372,20 +402,23 @@ class _Block:
         """The spans of values by pixel, (height, width), in some cells; `values` must be the block's own."""
         if values.ndim == 0:
             return Span.of(values)
+        return _at(self._whole(values, level), cells)
+
+    def _whole(self, values: Array, level: int) -> Span:
+        """The spans of all cells, from those of the cells of the next level."""
         key = id(values), level
         if key not in self._spans:
-            self._spans[key] = self._reduced(values, LEVELS[level])
-        return _at(self._spans[key], cells)
-
-    def _reduced(self, values: Array, side: int) -> Span:
-        if side == 1:
-            return Span.of(values.ravel())
-        rows, columns = (np.arange(0, length, side) for length in self._shape)
-        low, high = (
-            function.reduceat(function.reduceat(values, rows, axis=0), columns, axis=1).ravel()
-            for function in (np.minimum, np.maximum)
-        )
-        return Span(low, high)
+            if level == len(LEVELS) - 1:
+                self._spans[key] = Span.of(values.ravel())
+            else:
+                finer, size = self._whole(values, level + 1), self._size(level + 1)
+                times = LEVELS[level] // LEVELS[level + 1]
+                low, high = (
+                    _joined(function, _joined(function, ends.reshape(size), times).T, times).T.ravel()
+                    for function, ends in ((np.minimum, finer.lo), (np.maximum, finer.hi))
+                )
+                self._spans[key] = Span(low, high)
+        return self._spans[key]
 
     def finer(self, level: int, cells: Index) -> tuple[Index, Index]:
         """The cells of the next level within `cells`, and which of these each of them lies in."""
@@ -399,7 +432,7 @@ class _Block:
         parents = np.broadcast_to(np.arange(len(cells))[:, None, None], inside.shape)
         return (children_y * columns + children_x)[inside], parents[inside]
 
-    def place(self, pixel: int) -> tuple[int, int]:
-        """Row and column in the image of a cell of the last level."""
-        y, x = divmod(pixel, self._shape[1])
-        return self._corner[0] + y, self._corner[1] + x
+    def place(self, level: int, cell: int) -> tuple[int, int]:
+        """Row and column in the image of a cell's first pixel."""
+        y, x = divmod(cell, self._size(level)[1])
+        return self._corner[0] + y * LEVELS[level], self._corner[1] + x * LEVELS[level]

@@ -28,15 +28,22 @@ class Recipe:
     fresnel_angle: str | None = None
     variables: Mapping[str, float] = field(default_factory=dict)
 
-    def pair(self, without: Collection[str] = (), *, whole: bool = False, note: str = "") -> Pair:
-        """The binding MID and the MVIS, less some effects; a `whole` MID takes the images of all effects."""
-        angle = None if {"fresnel", "specular"} & set(without) else self.fresnel_angle
+    def pair(
+        self,
+        without: Collection[str] = (),
+        *,
+        effects: Collection[str] | None = None,
+        device: Sequence[str] | None = None,
+        note: str = "",
+    ) -> Pair:
+        """The binding MID and the MVIS."""
         return build_pair(
             self.primaries,
+            effects=effects,
             without=without,
-            fresnel_angle=angle,
+            fresnel_angle=self.fresnel_angle,
             variables=self.variables,
-            device=self.pair().compiled.inputs if whole else None,
+            device=device,
             note=note,
         )
 
@@ -44,11 +51,12 @@ class Recipe:
         self,
         without: Collection[str] = (),
         *,
+        effects: Collection[str] | None = None,
         reference: ArrayLike | None = None,
         device: Sequence[str] | None = None,
         note: str = "",
     ) -> ColourMid:
-        """The colour MID, less some effects."""
+        """The colour MID."""
         return build_colour_mid(
             self.primaries,
             interpolation=self.interpolation,
@@ -56,6 +64,7 @@ class Recipe:
             slope_method=self.slope_method,
             p=self.p,
             exponent=self.exponent,
+            effects=effects,
             without=without,
             reference=reference,
             device=device,

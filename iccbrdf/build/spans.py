@@ -115,6 +115,8 @@ class Directions:
 
     vector: Vector
     """Components of shape (n,)."""
+    examples: Array
+    """One of the directions of each element, shape (n, 3)."""
     texts: tuple[str, ...]
     """For people."""
 
@@ -127,7 +129,7 @@ class Directions:
         vectors = np.asarray(vectors, np.float64)
         unit = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
         x, y, z = (Span.of(component) for component in unit.T)
-        return cls((x, y, z), tuple(texts))
+        return cls((x, y, z), unit, tuple(texts))
 
     @classmethod
     def between(cls, start: tuple[float, float], end: tuple[float, float]) -> Directions:
@@ -144,7 +146,8 @@ class Directions:
         sin_z, cos_z = _sine(zeniths), _sine(zeniths + 90)
         vector = (sin_z * _sine(azimuths + 90), sin_z * _sine(azimuths), cos_z)
         texts = [f"{z[0]:g}..{z[1]:g},{a[0]:g}..{a[1]:g}" for z, a in pairs]
-        return cls(vector, tuple(texts))
+        examples = direction(zeniths.mean(axis=1), azimuths.mean(axis=1))
+        return cls(vector, examples, tuple(texts))
 
     def join(self, other: Directions) -> Directions:
         """These and those."""
@@ -152,7 +155,8 @@ class Directions:
             Span(np.concatenate([a.lo, b.lo]), np.concatenate([a.hi, b.hi]))
             for a, b in zip(self.vector, other.vector, strict=True)
         )
-        return Directions((x, y, z), self.texts + other.texts)
+        examples = np.concatenate([self.examples, other.examples])
+        return Directions((x, y, z), examples, self.texts + other.texts)
 
 
 def _sine(degrees: Array) -> Span:

@@ -19,6 +19,7 @@ COMMANDS = {
     "fit": "Fit a reflection model to goniometric measurements.",
     "evaluate": "Run the papers' experiments on measurements.",
     "build": "Make a MID and an MVIS profile from a primaries file.",
+    "plan": "Say which effects an image calls for, by bounds.",
     "apply": "Map an image through profiles: XYZ TIFFs and PNG softproofs.",
     "proof": "Proof print jobs on a relief, under several lights.",
     "dump": "Show what a profile holds.",

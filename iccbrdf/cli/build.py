@@ -10,10 +10,24 @@ import click
 
 from iccbrdf.brdf.primaries import MIN_NODES, read_primaries
 from iccbrdf.brdf.slopes import read_slopes
-from iccbrdf.build import GRIDS, INTERPOLATIONS, SLOPE_METHODS, build_colour_mid, build_pair, build_tables
-from iccbrdf.cli.options import emit, environment, force_option, json_option, name_list, scene_options
+from iccbrdf.build import GRIDS, INTERPOLATIONS, SLOPE_METHODS, ColourMid, build_tables
+from iccbrdf.build.recipe import Recipe
+from iccbrdf.cli.options import (
+    emit,
+    environment,
+    force_option,
+    json_option,
+    name_list,
+    plan_options,
+    scene_options,
+)
 from iccbrdf.errors import UsageError
 from iccbrdf.files import make_folder, write_together
+from iccbrdf.images.record import Samples
+
+CHECK_FAILED = 1
+ROUNDING = 1e-3
+"""CIEDE2000 that float32 may make of nothing."""
 
 EPILOG = """
 \b
@@ -23,6 +37,8 @@ Examples:
   iccbrdf build primaries.json -o out --slopes slopes.json
   The same as tables, for systems that run no calculator:
   iccbrdf build primaries.json -o out --table 33
+  Only what an image calls for, under the light that it is for:
+  iccbrdf build primaries.json -o out --for relief.tif --light 50,180 --tolerance 0.5
   Without the Fresnel term, and with other defaults for light and view:
   iccbrdf build primaries.json -o out --without fresnel --light 60,90 --view 10,270
 """
@@ -47,6 +63,10 @@ Examples:
               help="Also write the interpolation as tables of so many points an axis.")  # fmt: skip
 @click.option("--effects", metavar="NAMES", help="Simulate these effects only, separated by commas.")
 @click.option("--without", metavar="NAMES", help="Simulate all effects but these, separated by commas.")
+@click.option("--for", "image", type=click.Path(path_type=Path),
+              help="Simulate what this image calls for only, under --light or --lights and --view (see "
+              "iccbrdf plan).")  # fmt: skip
+@plan_options
 @click.option("--fresnel-angle", type=click.Choice(("theta_i", "alpha")),
               help="Angle of the Fresnel term: of incidence, as printed (the default), or between half "
               "vector and view, which keeps the model reciprocal.")  # fmt: skip
@@ -64,6 +84,11 @@ def command(
     grid: str | None,
     effects: str | None,
     without: str | None,
+    image: Path | None,
+    lights: tuple[str, ...],
+    tolerance: float,
+    samples: Samples | None,
+    channels: str | None,
     fresnel_angle: str | None,
     light: str | None,
     view: str | None,
@@ -83,36 +108,48 @@ def command(
 
     The colour MID interpolates between the primaries and needs four of them; without, it is left out.
     --light, --view and --env set the defaults that the profiles hold; whoever runs them may set others.
+    With --for, the MID is that of the image's kind, and the bound of what is lost stands in the descriptions;
+    the proof of the image is made both ways then, and exit code 1 says that the bound did not hold.
     """
     if effects is not None and without is not None:
         raise UsageError("--effects and --without are two ways to say one thing: give one of them")
     source = read_primaries(primaries)
-    switched: dict[str, Any] = {
-        "effects": name_list(effects) if effects is not None else None,
-        "without": name_list(without or ""),
-    }
-    pair = build_pair(
-        source,
-        **switched,
-        fresnel_angle=fresnel_angle,
-        variables=environment(light, view, env),
-    )
-    built = pair.files
-    wanted = interpolation is not None or slopes is not None or grid is not None
     if slope_method is not None and slopes is None:
         raise UsageError("--slope-method needs --slopes, the measurements that it works with")
-    colour = None
-    if wanted or len(source.primaries) >= MIN_NODES:
-        colour = build_colour_mid(
-            source,
-            interpolation=interpolation or "smooth",
-            slopes=read_slopes(slopes) if slopes is not None else None,
-            slope_method=slope_method or "affine",
-            p=p,
-            exponent=exponent,
-            **switched,
-        )
-        built |= colour.files
+    recipe = Recipe(
+        source,
+        read_slopes(slopes) if slopes is not None else None,
+        interpolation or "smooth",
+        slope_method or "affine",
+        p,
+        exponent,
+        fresnel_angle,
+        environment(light, view, env),
+    )
+    plan: dict[str, Any] | None = None
+    plan_text: list[str] = []
+    holds = True
+    colour: ColourMid | None = None
+    if image is not None:
+        if effects is not None or without is not None or grid is not None:
+            raise UsageError("--for chooses the effects: leave out --effects, --without and --table")
+        # Images and a CMM are needed for this alone.
+        from iccbrdf.cli.plan import plan_lines, plan_result, planned
+
+        found, check = planned(image, recipe, lights, recipe.variables, tolerance, samples, channels)
+        pair, colour = found.reduced.pair, found.reduced.colour
+        plan = {"image": str(image), **plan_result(found, check)}
+        plan_text = [f"for {image}:", *plan_lines(found, check)]
+        holds = check.dE <= max(found.decision.bound, ROUNDING)
+    else:
+        if lights or tolerance or samples or channels:
+            raise UsageError("--lights, --tolerance, --samples and --channels belong to --for")
+        only = name_list(effects) if effects is not None else None
+        pair = recipe.pair(name_list(without or ""), effects=only)
+        wanted = interpolation is not None or slopes is not None or grid is not None
+        if wanted or len(source.primaries) >= MIN_NODES:
+            colour = recipe.colour_mid(name_list(without or ""), effects=only)
+    built = pair.files | (colour.files if colour else {})
     tables = None
     if grid is not None:
         if (p, exponent) != (2, -1):
@@ -135,15 +172,22 @@ def command(
         "executed": compiled.executed,
         "colour_mid_executed": colour.compiled.executed if colour else None,
         "tables": [asdict(error) for error in tables.errors] if tables else [],
+        "plan": plan,
         "files": [str(file) for file in files],
     }
     text = [
         f"{source.model}: {len(compiled.program)} operators, at most {compiled.executed} run for a pixel",
         f"  effects: {', '.join(simulated) or 'none'}",
+        *plan_text,
         f"colour MID: at most {colour.compiled.executed} operators run for a pixel"
         if colour
+        else "no colour MID: the image holds parameters"
+        if plan
         else f"no colour MID: {len(source.primaries)} primaries, {MIN_NODES} are needed",
         *([tables.report] if tables else []),
         *(f"  -> {file}" for file in files),
     ]
     emit(as_json, "iccbrdf.build/1", result, "\n".join(text))
+    if not holds:
+        click.echo("iccbrdf: the reduced proof is further from the full one than its bound", err=True)
+        click.get_current_context().exit(CHECK_FAILED)

@@ -60,6 +60,23 @@ def scene_options(command: F) -> F:
     return command
 
 
+def plan_options(command: F) -> F:
+    """--lights, --tolerance, --samples and --channels."""
+    for option in (
+        click.option("--channels", metavar="NAMES",
+                     help="Names of the image's channels, separated by commas, where it does not say them."),
+        click.option("--samples", type=click.Choice(("device", "real")),
+                     help="What a float image holds, where it does not say so itself."),
+        click.option("--tolerance", type=FiniteRange(min=0), default=0.0, show_default=True, metavar="DE",
+                     help="CIEDE2000 that may be lost; 0: none, but for float32 rounding."),
+        click.option("--lights", multiple=True, metavar="DIRECTION[:DIRECTION]",
+                     help="Instead of --light: each light of an animation, or all directions between two in "
+                     "zenith and azimuth; repeatable."),
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
 def name_list(text: str) -> list[str]:
     """Names separated by commas."""
     return [name.strip() for name in text.split(",") if name.strip()]

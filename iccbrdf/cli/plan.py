@@ -1,0 +1,202 @@
+"""iccbrdf plan: which effects an image calls for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from iccbrdf.brdf.primaries import read_primaries
+from iccbrdf.brdf.slopes import read_slopes
+from iccbrdf.build import INTERPOLATIONS, SLOPE_METHODS
+from iccbrdf.build.effects import EFFECTS
+from iccbrdf.build.recipe import Recipe
+from iccbrdf.build.spans import Directions
+from iccbrdf.cli.options import emit, environment, json_option, name_list, plan_options, scene_options
+from iccbrdf.errors import UsageError
+from iccbrdf.images import Samples, open_tiff
+from iccbrdf.planning import Check, ScenePlan, check_image, plan_image
+from iccbrdf.scene import LIGHT, VIEW, parse_direction, parse_number
+
+MAX_CHECKS = 8
+"""Lights that a plan is checked under: all of few, some of many."""
+
+EPILOG = """
+\b
+Examples:
+  What a print calls for, lit from the left and seen from above:
+    iccbrdf plan relief.tif --primaries primaries.json --light 50,180
+  For a light that goes round, where CIEDE2000 of 0.5 may be lost:
+    iccbrdf plan relief.tif --primaries primaries.json --lights 60,0:60,360 --tolerance 0.5
+  The profiles of that:
+    iccbrdf build primaries.json -o out --for relief.tif --lights 60,0:60,360 --tolerance 0.5
+"""
+
+
+@click.command("plan", epilog=EPILOG)
+@click.argument("image", type=click.Path(path_type=Path))
+@click.option("--primaries", required=True, type=click.Path(path_type=Path),
+              help="The primaries file that the profiles are made of.")  # fmt: skip
+@click.option("--slopes", type=click.Path(path_type=Path), help="The slopes file, for an image of XYZ.")
+@click.option("--slope-method", type=click.Choice(SLOPE_METHODS), default="affine", show_default=True)
+@click.option("--interpolation", type=click.Choice(INTERPOLATIONS), default="smooth", show_default=True)
+@plan_options
+@scene_options
+@json_option
+def command(
+    image: Path,
+    primaries: Path,
+    slopes: Path | None,
+    slope_method: str,
+    interpolation: str,
+    lights: tuple[str, ...],
+    tolerance: float,
+    samples: Samples | None,
+    channels: str | None,
+    light: str | None,
+    view: str | None,
+    env: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Say which effects IMAGE calls for, and why.
+
+    The image is a TIFF for the binding MID (BRDF parameters and normals) or for the colour MID (XYZ and
+    normals).  For each effect, a bound tells how far the proof without it is from the full one at most, over
+    all pixels and lights; what stays below the tolerance can be left out.
+    """
+    recipe = Recipe(
+        read_primaries(primaries),
+        read_slopes(slopes) if slopes is not None else None,
+        interpolation,
+        slope_method,
+    )
+    variables = environment(light, view, env)
+    plan, check = planned(image, recipe, lights, variables, tolerance, samples, channels)
+    result = {"image": str(image), "primaries": str(primaries), **plan_result(plan, check)}
+    emit(as_json, "iccbrdf.plan/1", result, "\n".join([f"{image}:", *plan_lines(plan, check)]))
+
+
+def planned(
+    image: Path,
+    recipe: Recipe,
+    lights: Sequence[str],
+    variables: Mapping[str, float],
+    tolerance: float,
+    samples: Samples | None,
+    channels: str | None,
+) -> tuple[ScenePlan, Check]:
+    """The plan of an image under `lights`, or the light that `variables` set, and its check."""
+    own = recipe.pair().compiled.variables
+    values = {**own, **variables}
+    directions = _directions(lights, [values[name] for name in LIGHT])
+    eye = np.array([[values[name] for name in VIEW]])
+    if not np.any(eye) or not np.all(np.any(directions.examples, axis=1)):
+        raise UsageError("light and view: found a vector of length 0, which has no direction")
+    declared = name_list(channels) if channels is not None else None
+    with open_tiff(image, samples) as source:
+        plan = plan_image(
+            source,
+            recipe,
+            directions,
+            Directions.single(eye, ["view"]),
+            tolerance=tolerance,
+            env=variables,
+            names=declared,
+        )
+        chosen = np.unique(np.linspace(0, len(directions) - 1, MAX_CHECKS).round().astype(int))
+        scenes = [
+            {**variables, **dict(zip(LIGHT, directions.examples[i].tolist(), strict=True))} for i in chosen
+        ]
+        return plan, check_image(source, plan, scenes)
+
+
+def _directions(texts: Sequence[str], light: Sequence[float]) -> Directions:
+    if not texts:
+        return Directions.single([light], ["light"])
+    found = []
+    for text in texts:
+        ends = text.split(":")
+        if len(ends) > 2:
+            raise UsageError(f"--lights {text!r}: expected a direction, or two with a colon between them")
+        vectors = [parse_direction("--lights", end) for end in ends]
+        if len(ends) == 1:
+            found.append(Directions.single(vectors, [text]))
+        else:
+            found.append(Directions.between(*(_angles(text, end) for end in ends)))
+    return reduce(Directions.join, found)
+
+
+def _angles(text: str, end: str) -> tuple[float, float]:
+    parts = end.split(",")
+    if len(parts) != 2:
+        raise UsageError(f"--lights {text!r}: expected ZENITH,AZIMUTH in degrees at both ends, not a vector")
+    return parse_number("--lights", parts[0]), parse_number("--lights", parts[1])
+
+
+def plan_result(plan: ScenePlan, check: Check) -> dict[str, Any]:
+    """A plan for JSON."""
+    seconds = dict(plan.seconds)
+    return {
+        "kind": "XYZ" if plan.is_colour else "BRDF",
+        "tolerance": plan.tolerance,
+        "effects": [
+            {
+                "effect": finding.effect,
+                "called_for": finding.called_for,
+                "bound": _finite(finding.bound),
+                "exact": finding.exact,
+                "place": finding.place,
+                "light": finding.light,
+            }
+            for finding in plan.findings
+        ],
+        "without": list(plan.decision.without),
+        "bound": plan.decision.bound,
+        "exact": plan.decision.exact,
+        "check": {
+            "max_delta_E_CIE2000": _finite(check.dE),
+            "place": check.place,
+            "max_relative": check.relative,
+            "lights": check.scenes,
+        },
+        "executed": {"full": plan.full.executed, "reduced": plan.reduced.executed},
+        "seconds": seconds,
+        "share_of_bounding": seconds["bounding"] / sum(seconds.values()),
+    }
+
+
+def plan_lines(plan: ScenePlan, check: Check) -> Iterator[str]:
+    """A plan for people."""
+    for finding in plan.findings:
+        yield f"  {finding.effect:<20} {_verdict(plan, finding)}"
+    left_out = ", ".join(plan.decision.without) or "nothing"
+    loss = (
+        "the same but for rounding" if plan.decision.exact else f"CIEDE2000 at most {plan.decision.bound:.3g}"
+    )
+    yield f"  leave out: {left_out} ({loss}; found {check.dE:.3g} on the image)"
+    yield f"  operators for a pixel: {plan.reduced.executed} of {plan.full.executed}"
+    seconds = ", ".join(f"{name} {value:.2f} s" for name, value in plan.seconds.items())
+    yield f"  {seconds}"
+
+
+def _verdict(plan: ScenePlan, finding: Any) -> str:
+    bound = f"CIEDE2000 up to {finding.bound:.3g}" if math.isfinite(finding.bound) else "no bound"
+    if finding.called_for and finding.place is not None:
+        row, column = finding.place
+        where = f"at row {row}, column {column}" + (
+            f", light {finding.light}" if finding.light != "light" else ""
+        )
+        return f"called for: {bound} without it, {where}"
+    if finding.called_for:
+        return f"kept: {bound} without it, and the tolerance is used up" if not finding.exact else "kept"
+    small = "no change without it" if finding.exact else f"{bound} without it"
+    return small if EFFECTS[finding.effect].spares else f"{small}; kept, for it costs nothing"
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
