@@ -218,6 +218,9 @@ class Planner:
         """Judge `cells` of a level, each under one of `lights`; those that fail are searched more finely."""
         for start in range(0, len(cells), CHUNK):
             here = slice(start, start + CHUNK)
+            if not any(question.open for question in questions):
+                return
+            self._spent += len(cells[here])
             failed = np.zeros(len(cells[here]), np.bool_)
             unsure: list[tuple[_Question, Change]] = []
             for question, change in self._changes(block, level, lights[here], cells[here], questions):
@@ -231,9 +234,8 @@ class Planner:
                     unsure.append((question, change))
             if not unsure:
                 continue
-            finer, parents = block.finer(level, cells[here][failed])
-            self._spent += len(finer)
             if self._spent <= EFFORT * block.count(len(LEVELS) - 1):
+                finer, parents = block.finer(level, cells[here][failed])
                 asked = [question for question, _ in unsure]
                 self._search(block, level + 1, lights[here][failed][parents], finer, asked)
             else:
