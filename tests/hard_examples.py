@@ -22,6 +22,8 @@ from iccbrdf.brdf.models import MODELS
 from iccbrdf.brdf.primaries import Primaries, Primary, read_primaries
 from iccbrdf.brdf.slopes import Slope, Slopes, read_slopes, slope_adjust, slope_angle
 from iccbrdf.build import build_pair
+from iccbrdf.build.literal import literal_mvis
+from iccbrdf.cmm import Transform
 from iccbrdf.icc import Profile
 from iccbrdf.resources import folder
 
@@ -94,6 +96,12 @@ def mvis_of(model: str, fresnel_angle: str | None = None) -> Profile:
     return build_pair(primaries(model), fresnel_angle=fresnel_angle).mvis
 
 
+@cache
+def printed_formulas(model: str) -> Transform:
+    """The model in float32 as the papers print it, by the quickest back end."""
+    return iccbrdf.link([literal_mvis(build_pair(primaries(model)), model)[0]], backend=BACKENDS[-1])
+
+
 def held_index() -> float:
     """The refractive index whose R0 is the float32 that a program holds for 1.5."""
     root = np.sqrt(float(np.float32(0.04)))
@@ -163,7 +171,7 @@ def directions(rng: np.random.Generator) -> Iterator[tuple[Array, Array]]:
             (_upwards(rng), _upwards(rng)),
         ):
             scaled = [v * 10 ** rng.choice([0, 0, rng.uniform(-3, 3)]) for v in pair]
-            yield tuple(np.float32(v).astype(np.float64) for v in scaled)  # type: ignore[misc]
+            yield tuple(np.float32(v).astype(np.float64) for v in scaled)
 
 
 def _normals(light: Array, view: Array, m: Array, rng: np.random.Generator) -> Array:
@@ -184,7 +192,9 @@ def _normals(light: Array, view: Array, m: Array, rng: np.random.Generator) -> A
         ((15,), np.zeros((count, 3))),
     ):
         n = np.where(np.isin(kind, kinds)[:, None], others, n)
-    length = np.where(rng.random(count) < 0.5, 1, 10 ** rng.uniform(*np.log10(LENGTHS), count))
+    length = np.where(
+        rng.random(count) < 0.5, 1, 10 ** rng.uniform(np.log10(LENGTHS[0]), np.log10(LENGTHS[1]), count)
+    )
     return np.asarray(n * length[:, None])
 
 
@@ -319,7 +329,7 @@ def is_beside_switch(XYZ: Array) -> NDArray[np.bool_]:
     moved = (interpolate(XYZ + nudge * (abs(XYZ) + 0.01), PRIMARIES, method="published") for nudge in nudges)
     changes = [np.max(abs(there - here) / (abs(here) + 0.01), axis=1) for there in moved]
     cancels = abs(np.sum(XYZ, axis=1)) < 1e-3 * np.sum(abs(XYZ), axis=1)
-    return cancels | (np.max(changes, axis=0) > 1e-3)
+    return np.asarray(cancels | (np.max(changes, axis=0) > 1e-3))
 
 
 # All of it by every back end --------------------------------------------------------------------------------
@@ -352,6 +362,11 @@ class Look:
         """The lesser cosine of light and viewer on the prints, (n, 1)."""
         return smallest_cosine(self.printed, self.light, self.view)[:, None]
 
+    def as_printed(self) -> Array:
+        """XYZ of the prints in float32 by the papers' formulas as they stand, (n, 3)."""
+        transform = printed_formulas(self.model).with_env(variables(self.light, self.view))
+        return transform(self.printed).astype(np.float64)
+
     def of_prints(self, backend: str, dtype: str) -> Array:
         """XYZ of the prints in float64, (n, 3)."""
         return self.XYZ[backend, dtype][: self.prints].astype(np.float64)
@@ -373,38 +388,3 @@ def looks(model: str, geometries: int, prints_each: int, anything_each: int, see
         env = variables(light, view)
         found = {key: transform.with_env(env)(pixels) for key, transform in transforms.items()}
         yield Look(model, light, view, pixels, prints_each, found)
-
-
-# The papers' equations, letter by letter --------------------------------------------------------------------
-
-
-def literal(model: str, pixels: Pixels, light: Array, view: Array) -> Pixels:
-    """XYZ (n, 3) by the equations as printed, in float32, on vectors that are scaled to length 1 first.
-
-    Black where light or viewer are not above the surface, as no formula can be expected to know.
-    """
-    names = MODELS[model].channels
-    with np.errstate(all="ignore"):
-        n, i, v = (unit(np.asarray(a, np.float32)) for a in (pixels[:, -3:], light, view))  # type: ignore[arg-type]
-        h = unit(i + v)
-        cos_i, cos_v, cos_h = (np.sum(n * a, axis=1, keepdims=True) for a in (i, v, h))
-        cos_alpha = np.sum(v * h)
-        diffuse = pixels[:, :3]
-        ks = pixels[:, [k for k, name in enumerate(names) if name.startswith("ks")]]
-        m = pixels[:, [k for k, name in enumerate(names) if name.startswith("m")]]
-        theta_h = np.arccos(cos_h)
-        pi = np.float32(np.pi)
-        if model == "ward":
-            lobe = np.exp(-(np.tan(theta_h) ** 2) / m**2) / (4 * pi * m**2 * np.sqrt(cos_i * cos_v))
-            XYZ = pi * cos_i * (diffuse / pi + ks * lobe)
-        else:
-            D = np.exp(-((np.tan(theta_h) / m) ** 2)) / (m**2 * np.cos(theta_h) ** 4)
-            shadowed = 2 * cos_h * np.minimum(cos_i, cos_v) / cos_alpha
-            facets = D * np.minimum(1, shadowed) / (pi * cos_i * cos_v)
-            if model == "cook_torrance_2020":
-                XYZ = cos_i * (ks * facets + (1 - ks) * diffuse)
-            else:
-                R0 = np.float32(0.04)
-                F = R0 + (1 - R0) * (1 - cos_i) ** 5
-                XYZ = pi * cos_i * (diffuse / pi + ks * F * facets)
-        return np.where((cos_i > 0) & (cos_v > 0), XYZ, np.float32(0))
