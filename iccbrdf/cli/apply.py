@@ -27,11 +27,12 @@ from iccbrdf.cli.pipeline import (
     run,
     run_on_cluster,
 )
-from iccbrdf.cmm import INTENTS, link
+from iccbrdf.cmm import INTENTS, MAX_COST, link
 from iccbrdf.errors import UsageError
 from iccbrdf.icc import read_profile
 from iccbrdf.images import ImageSource, Samples, WithNormals, processors
 from iccbrdf.images.blocks import Array
+from iccbrdf.images.checks import NonFinite
 
 MOST_WORKERS = 8
 """Unless more are asked for: reading and writing keep no more busy, and each takes memory."""
@@ -125,6 +126,11 @@ def _effects(effects: str | None, left_out: str | None) -> str | list[str]:
 @click.option(
     "--depth", type=click.Choice(("8", "16")), default="8", show_default=True, help="Bits of a PNG."
 )
+@click.option("--nonfinite", type=click.Choice(("keep", "zero", "error")), default="keep", show_default=True,
+              help="What to do with pixels of the image that are not finite: pass them on, take all their "
+              "samples for 0, or stop.")  # fmt: skip
+@click.option("--max-cost", type=click.FloatRange(min=0, min_open=True), default=MAX_COST, show_default=True,
+              help="Operators of the profiles that all pixels together may take.")  # fmt: skip
 @click.option("--double", is_flag=True, help="Compute in float64.")
 @click.option("--workers", type=click.IntRange(1), default=lambda: min(processors(), MOST_WORKERS),
               show_default=f"the processors, at most {MOST_WORKERS}",
@@ -157,6 +163,8 @@ def command(
     embed: bool,
     exposure: float,
     depth: str,
+    nonfinite: NonFinite,
+    max_cost: float,
     double: bool,
     workers: int,
     cluster: str | None,
@@ -202,12 +210,17 @@ def command(
             "backend": backend,
             "effects": _effects(effects, left_out),
             "without": name_list(left_out or ""),
+            "max_cost": max_cost,
         }
         transform = link(chain, **settings)
         names = arranged_channels(source, transform.channels_in, declared)
         if names is not None:
             transform = link(chain, channels=names, **settings)
-        common: dict[str, Any] = {"overwrite": force, "last_slope": last_slope(chain[0])}
+        common: dict[str, Any] = {
+            "overwrite": force,
+            "last_slope": last_slope(chain[0]),
+            "nonfinite": nonfinite,
+        }
         if cluster is None:
             done = run(source, transform, last, targets, label=image.name, workers=workers, **common)
         else:
@@ -227,15 +240,21 @@ def command(
             "backend_reason": transform.execution.reason,
             "effects": settings["effects"],
             "without": settings["without"],
-            "kinds": dict(done.kinds),
+            "kinds": dict(done.kinds) if transform.adaptive else {},
+            "nonfinite": nonfinite,
             "not_finite_in": done.not_finite_in,
             "not_finite_out": done.not_finite_out,
             "beyond_slopes": done.beyond_slopes,
             "outputs": done.outputs,
         }
-    for count, what in ((done.not_finite_in, "image"), (done.not_finite_out, "result")):
+    for count, what, more in (
+        (done.not_finite_in, "image", "; their pixels are taken for 0" if nonfinite == "zero" else ""),
+        (done.not_finite_out, "result", ""),
+    ):
         if count:
-            click.echo(f"iccbrdf: warning: {count} samples of the {what} are not finite numbers", err=True)
+            click.echo(
+                f"iccbrdf: warning: {count} samples of the {what} are not finite numbers{more}", err=True
+            )
     if done.beyond_slopes:
         click.echo(
             f"iccbrdf: warning: {done.beyond_slopes} pixels are steeper than the last measured slope of "

@@ -59,7 +59,9 @@ _MAX_KERNELS = 3
 """Kernels of one kind, made for what more and more boxes have in common."""
 _MAX_KEPT = 1024
 """Boxes and constants that kernels and arguments are kept for."""
-_WHOLE, _NOT_FINITE = -2, -1
+_MAX_BOUND = 16
+"""Run-time variables that they are kept for."""
+_NOT_FINITE = -1
 
 
 @lru_cache(maxsize=16)
@@ -161,6 +163,7 @@ class Adaptive:
         self.plain = plain
         self.questions = questions(graph, names)
         self._chains = decodings(graph)
+        self._bound: dict[frozenset[tuple[str, float]], _Bound] = {}
         self._digits = 1 << np.arange(len(self.questions))
         self._asked = np.zeros((len(names), len(self.questions)), np.bool_)
         for i, question in enumerate(self.questions):
@@ -174,14 +177,21 @@ class Adaptive:
                 self.kinds[answers] = Kind(graph, len(names), yes, plain.backend)
 
     def bind(self, env: Mapping[str, float]) -> Run:
-        return _Bound(self, env)
+        """As `Execution.bind`; what is found for tiles is kept for others under the same variables."""
+        key = frozenset(env.items())
+        bound = self._bound.get(key)
+        if bound is None:
+            if len(self._bound) >= _MAX_BOUND:
+                self._bound.clear()
+            bound = self._bound[key] = _Bound(self, dict(env))
+        return bound
 
     def answers(self, found: _Statistics) -> Array:
         """By piece, the number of its kind, whether there is such a kind or not; or _NOT_FINITE."""
         low, high = found
         yes = ~((low != high) @ self._asked)
         for i, question in enumerate(self.questions):
-            if question.zero:
+            if question.zero and yes[:, i].any():
                 for channel in question.channels:
                     yes[:, i] &= decoded(self._chains[channel], low[:, channel]) == 0
         answers: Array = yes @ self._digits
@@ -191,14 +201,8 @@ class Adaptive:
         return answers
 
 
-class _Group(NamedTuple):
-    """Pieces of a tile that run together."""
-
-    answers: int
-    """The number of a kind, or _WHOLE or _NOT_FINITE."""
-    pieces: Sequence[int]
-    found: _Statistics | None
-    """Of the kind's pieces, a row each or one for all of them."""
+_Key: TypeAlias = "tuple[int, tuple[float, ...]]"
+"""The number of a kind, and the values of the channels that are constant in it."""
 
 
 class _Bound:
@@ -210,84 +214,103 @@ class _Bound:
         self._finite, self._anything = chain.plain.runs(env)
         # What threads find at the same time is the same, so that they need not wait for each other.
         self._specials: dict[tuple[int, _Ends, _Ends], _Special | None] = {}
-        self._arguments: dict[tuple[int, bytes], list[np.generic]] = {}
+        self._arguments: dict[tuple[int, tuple[float, ...]], list[np.generic]] = {}
 
     def __call__(self, pixels: Array, out: Array) -> Tally:
         tally: Tally = Counter()
         dtype = self._chain.plain.schedule.graph.dtype
         for part, pieces in _tiles(len(pixels)):
-            tile = np.ascontiguousarray(pixels[part], dtype)
-            for group in self._groups(tile, pieces):
-                size = len(tile) // pieces
-                name = self._run(group, tile, out[part], size)
-                tally[name] += size * len(group.pieces)
+            self._tile(_Tile(np.ascontiguousarray(pixels[part], dtype), out[part], pieces), tally)
         return tally
 
-    def _groups(self, tile: Array, pieces: int) -> list[_Group]:
-        chain = self._chain
-        sampled = chain.answers(_Statistics.sampled(tile, pieces))
-        if chain.kinds.keys().isdisjoint(sampled.tolist()):
-            return [_Group(_WHOLE if all_finite(tile) else _NOT_FINITE, range(pieces), None)]
-        if pieces == 1 or (sampled == sampled[0]).all():
-            found = _Statistics.of(tile, 1)
-            answers = int(chain.answers(found)[0])
-            if answers == sampled[0]:
-                return [_Group(answers, range(pieces), found)]
-        return self._sorted(_Statistics.of(tile, pieces))
+    def _tile(self, tile: _Tile, tally: Tally) -> None:
+        """Run pieces that look alike together, if they are, and the others in the whole chain."""
+        least = min(_LEAST_PIECES, tile.pieces)
+        together: dict[_Key, list[int]] = {}
+        for piece, key in enumerate(self._keys(_Statistics.sampled(tile.pixels, tile.pieces))):
+            if key is not None:
+                together.setdefault(key, []).append(piece)
+        waiting = list(together.items())
+        rest = set(range(tile.pieces))
+        while waiting:
+            key, pieces = waiting.pop()
+            if len(pieces) < least:
+                continue
+            pixels = tile.gathered(pieces)
+            found = _Statistics.of(pixels, 1)
+            if self._keys(found) == [key]:
+                special = self._special(key, found)
+                if special is not None:
+                    arguments = self._values(special, key)
+                    tile.run(partial(special.kernel.run, arguments=arguments), pieces, pixels)
+                    tally[self._chain.kinds[key[0]].name] += len(pixels)
+                    rest.difference_update(pieces)
+            elif len(pieces) > 1:
+                keys = self._keys(_Statistics.of(pixels, len(pieces)))
+                waiting.append((key, [p for p, other in zip(pieces, keys, strict=True) if other == key]))
+        if rest:
+            pixels = tile.gathered(sorted(rest))
+            finite = all_finite(pixels)
+            tile.run(self._finite if finite else self._anything, sorted(rest), pixels)
+            tally[FULL if finite else NOT_FINITE] += len(pixels)
 
-    def _sorted(self, found: _Statistics) -> list[_Group]:
-        """Pieces of a kind and with equal constants together; the few of rare ones with the others."""
+    def _keys(self, found: _Statistics) -> list[_Key | None]:
+        """By row; None for what runs in the whole chain."""
         kinds = self._chain.kinds
-        together: dict[tuple[int, bytes], list[int]] = {}
-        for i, answers in enumerate(self._chain.answers(found).tolist()):
-            if answers in kinds:
-                key = answers, found.low[i, kinds[answers].constant].tobytes()
-            else:
-                key = _WHOLE if answers != _NOT_FINITE else _NOT_FINITE, b""
-            together.setdefault(key, []).append(i)
-        rest = together.pop((_WHOLE, b""), [])
-        groups = []
-        for (answers, _), pieces in together.items():
-            if len(pieces) < min(_LEAST_PIECES, len(found.low)) and answers != _NOT_FINITE:
-                rest += pieces
-            else:
-                rows = _Statistics(found.low[pieces], found.high[pieces])
-                groups.append(_Group(answers, pieces, rows))
-        return [*groups, _Group(_WHOLE, sorted(rest), None)] if rest else groups
+        answers = self._chain.answers(found).tolist()
+        if kinds.keys().isdisjoint(answers):
+            return [None] * len(answers)
+        return [
+            (number, tuple(row[i] for i in kinds[number].constant)) if number in kinds else None
+            for number, row in zip(answers, found.low.tolist(), strict=True)
+        ]
 
-    def _run(self, group: _Group, tile: Array, out: Array, size: int) -> str:
-        """Compute the group's pixels; the name of their kind."""
-        kind = self._chain.kinds.get(group.answers)
-        special = None
-        if kind is not None and group.found is not None:
-            low, high = group.found.low.min(axis=0), group.found.high.max(axis=0)
-            special = self._special(group.answers, kind, low, high)
-        if kind is not None and special is not None:
-            arguments = self._values(special, kind, low)
-            _on_pieces(partial(special.kernel.run, arguments=arguments), group.pieces, tile, out, size)
-            return kind.name
-        whole = self._anything if group.answers == _NOT_FINITE else self._finite
-        _on_pieces(whole, group.pieces, tile, out, size)
-        return NOT_FINITE if group.answers == _NOT_FINITE else FULL
-
-    def _special(self, answers: int, kind: Kind, low: Array, high: Array) -> _Special | None:
-        box = tuple(-_up(-value) for value in low.tolist()), tuple(map(_up, high.tolist()))
-        key = (answers, *box)
-        if key not in self._specials:
+    def _special(self, key: _Key, found: _Statistics) -> _Special | None:
+        number, _ = key
+        box = tuple(-_up(-value) for value in found.low[0].tolist()), tuple(map(_up, found.high[0].tolist()))
+        where = (number, *box)
+        if where not in self._specials:
             if len(self._specials) >= _MAX_KEPT:
                 self._specials.clear()
-            self._specials[key] = kind.special(*box, self._env)
-        return self._specials[key]
+            self._specials[where] = self._chain.kinds[number].special(*box, self._env)
+        return self._specials[where]
 
-    def _values(self, special: _Special, kind: Kind, values: Array) -> list[np.generic]:
-        constants = values[list(kind.constant)]
-        key = id(special.plan), constants.tobytes()
-        if key not in self._arguments:
+    def _values(self, special: _Special, key: _Key) -> list[np.generic]:
+        number, constants = key
+        where = id(special.plan), constants
+        if where not in self._arguments:
             if len(self._arguments) >= _MAX_KEPT:
                 self._arguments.clear()
-            channels = {variable_of(i): float(v) for i, v in zip(kind.constant, constants, strict=True)}
-            self._arguments[key] = uniform_values(special.plan, {**self._env, **channels})
-        return self._arguments[key]
+            names = map(variable_of, self._chain.kinds[number].constant)
+            channels = dict(zip(names, constants, strict=True))
+            self._arguments[where] = uniform_values(special.plan, {**self._env, **channels})
+        return self._arguments[where]
+
+
+class _Tile(NamedTuple):
+    """A tile's pixels and where the results go, in so many pieces of equal size."""
+
+    pixels: Array
+    out: Array
+    pieces: int
+
+    def gathered(self, pieces: Sequence[int]) -> Array:
+        """The pixels of some pieces, one after the other."""
+        if len(pieces) == self.pieces:
+            return self.pixels
+        channels = self.pixels.shape[1]
+        return self.pixels.reshape(self.pieces, -1, channels)[pieces].reshape(-1, channels)
+
+    def run(self, kernel: Callable[[Array, Array], None], pieces: Sequence[int], pixels: Array) -> None:
+        """Compute the results of the pieces that were gathered."""
+        if len(pieces) == self.pieces:
+            kernel(pixels, self.out)
+            return
+        results = np.empty((len(pixels), self.out.shape[1]), pixels.dtype)
+        kernel(pixels, results)
+        size = len(pixels) // len(pieces)
+        for i, piece in enumerate(pieces):
+            self.out[piece * size : (piece + 1) * size] = results[i * size : (i + 1) * size]
 
 
 def _tiles(count: int) -> Iterator[tuple[slice, int]]:
@@ -306,17 +329,3 @@ def _up(value: float) -> float:
         return math.ceil(value * 8) / 8
     mantissa, exponent = math.frexp(value)
     return math.ldexp(-0.5 if value < 0 else 0.5 if mantissa == 0.5 else 1.0, exponent)
-
-
-def _on_pieces(
-    run: Callable[[Array, Array], object], pieces: Sequence[int], tile: Array, out: Array, size: int
-) -> None:
-    """Run on some pieces of a tile as if they were one."""
-    if len(pieces) * size == len(tile):
-        run(tile, out)
-        return
-    gathered = tile.reshape(-1, size, tile.shape[1])[list(pieces)].reshape(-1, tile.shape[1])
-    results = np.empty((len(gathered), out.shape[1]), tile.dtype)
-    run(gathered, results)
-    for i, piece in enumerate(pieces):
-        out[piece * size : (piece + 1) * size] = results[i * size : (i + 1) * size]
