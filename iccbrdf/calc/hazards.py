@@ -111,22 +111,28 @@ def _in_range(a: Arithmetic, node: Node, arguments: Sequence[Interval]) -> tuple
     sizes = [argument.magnitude for argument in arguments]
     largest = a.largest * 0.99
     if node.op == "exp":
-        return 0, _held(arguments[0], math.log(largest))
+        return 0, f"min(x, {_down(math.log(largest))})"
     if node.op == "mul" and node.arguments[0] is node.arguments[1]:
         return 0, _held(arguments[0], math.sqrt(largest))
     if node.op == "mul":
-        index = sizes.index(max(sizes))
-        return index, _held(arguments[index], largest / min(sizes))
+        index = _larger(node, sizes)
+        return index, _held(arguments[index], largest / sizes[1 - index])
     if node.op in ("add", "sub"):
-        index = sizes.index(max(sizes))
-        return index, _held(arguments[index], largest / 2)
-    if node.op == "div" and sizes[0] * arguments[1].mignitude > 1:
+        index = _larger(node, sizes)
+        return index, _held(arguments[index], largest / 2 if sizes[1 - index] < largest / 2 else 0)
+    if node.op == "div" and sizes[0] * arguments[1].mignitude > 1 and node.arguments[0].op != "const":
         return 0, _held(arguments[0], largest * arguments[1].mignitude)
     if node.op == "div":
         return 1, _away_from_zero(a, *arguments)
     if node.op == "pow" and arguments[1].high > 0:
         return 0, _held(arguments[0], largest ** (1 / max(arguments[1].high, 1.0)))
     return 0, ""
+
+
+def _larger(node: Node, sizes: Sequence[float]) -> int:
+    """The operand that reaches farther; not a constant."""
+    constants = [operand.op == "const" for operand in node.arguments]
+    return constants.index(False) if any(constants) and not all(constants) else sizes.index(max(sizes))
 
 
 # Expressions -------------------------------------------------------------------------------------------
