@@ -27,7 +27,7 @@ from iccbrdf.errors import InputError, LimitError, UnsupportedError, UsageError
 from iccbrdf.files import StrPath
 from iccbrdf.images import Block, ImageSource, Place, TiffSink, create_tiff, processors
 from iccbrdf.images.blocks import Array
-from iccbrdf.images.checks import not_finite, steeper
+from iccbrdf.images.checks import NonFinite, admitted, not_finite, steeper
 from iccbrdf.images.tiff_writer import SampleType
 
 LOCAL = "local"
@@ -60,6 +60,7 @@ def apply(
     profile: bytes | None = None,
     last_slope: float | None = None,
     overwrite: bool = False,
+    nonfinite: NonFinite = "keep",
 ) -> Met:
     """Map an image through a transform on a cluster; the file is that of one process, byte for byte.
 
@@ -76,6 +77,8 @@ def apply(
         As `create_tiff`.
     last_slope
         The steepest slope in degrees that the transform has measurements for, if it adjusts to slopes.
+    nonfinite
+        What becomes of pixels of the image that are not finite.
 
     Raises
     ------
@@ -107,7 +110,7 @@ def apply(
         profile=profile,
         overwrite=overwrite,
     ) as sink:
-        work = _Work(transform, source.samples, last_slope, sink)
+        work = _Work(transform, source.samples, last_slope, sink, nonfinite)
         pixels = array.from_array(
             _Pixels(source), chunks=_chunks(source), name=False, meta=np.empty((0, 0, 0), np.float32)
         )
@@ -131,14 +134,17 @@ class _Work:
     samples: str
     last_slope: float | None
     sink: TiffSink
+    nonfinite: NonFinite
 
     def __call__(self, data: Array, block_info: Any) -> Array:
         (y0, _), (x0, _), _ = block_info[0]["array-location"]
+        block, not_finite_in = admitted(Block(y0, x0, data), self.nonfinite, "the image")
+        data = block.data
         result = self.transform(data)
         encoded = self.sink.encode(Block(y0, x0, result))
         self.sink.put(encoded)
         met = Met(
-            not_finite(data),
+            not_finite_in,
             not_finite(result),
             steeper(data, self.samples, self.transform.channels_in, self.last_slope),
             encoded.clipped,

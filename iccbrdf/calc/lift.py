@@ -27,9 +27,9 @@ CONSTANTS = {"true": 1.0, "ndef": 0.0}
 
 MAX_NODES = 20_000
 """Nodes of a graph: a program that needs more is left to the interpreter, as it would compile for minutes."""
-MAX_MOVES = 1 << 21
+MAX_MOVES = 1 << 19
 """Values moved while lifting: short programs can shuffle a deep stack for hours."""
-SAMPLED_AT_A_TIME = 128
+SAMPLED_AT_A_TIME = 512
 """Operations of a calculator curve's samples that take the time of a move."""
 
 

@@ -15,7 +15,7 @@ from typing import TypeAlias
 
 from iccbrdf.calc.graph import Graph, Node, check, evaluate
 
-MAX_VISITS = 1 << 17
+MAX_VISITS = 1 << 16
 """Nodes that `optimise` looks at, each as often as it is looked at; programs of ours need a thousandth."""
 
 Rule: TypeAlias = Callable[[Graph, Node], Node | None]

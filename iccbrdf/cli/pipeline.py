@@ -20,7 +20,7 @@ from iccbrdf.errors import UsageError, nearest
 from iccbrdf.files import check_target
 from iccbrdf.icc import Profile
 from iccbrdf.images import ImageSource, Place, Samples, create_tiff, in_order, open_tiff
-from iccbrdf.images.checks import not_finite, steeper
+from iccbrdf.images.checks import NonFinite, admitted, not_finite, steeper
 
 TIFF_SUFFIXES = (".tif", ".tiff")
 PNG_SUFFIX = ".png"
@@ -108,6 +108,7 @@ def run(
     label: str,
     last_slope: float | None = None,
     workers: int = 1,
+    nonfinite: NonFinite = "keep",
 ) -> Done:
     """Stream `source` through `transform`, whose chain ends on profile `last`, into `outputs`.
 
@@ -117,6 +118,15 @@ def run(
         The steepest slope in degrees that the chain has measurements for, if it adjusts to slopes.
     workers
         Blocks that are read and computed at a time; the result does not depend on it.
+    nonfinite
+        What becomes of pixels of the image that are not finite; counted in any case.
+
+    Raises
+    ------
+    LimitError
+        The image costs more than the transform allows.
+    InputError
+        The image cannot be read, or is not finite and shall be.
     """
     to_display = None
     if any(output.is_png for output in outputs):
@@ -127,6 +137,7 @@ def run(
             )
         to_display = standard_XYZ(last)
     done = Done()
+    transform.check_cost(source.height * source.width)
     first = next(iter(source.places()))
     samples = first.height * first.width * source.channels
     workers = max(1, min(workers, SAMPLES_AT_A_TIME // samples))
@@ -137,7 +148,7 @@ def run(
         advance = stack.enter_context(_progress(source, label))
 
         def work(place: Place) -> _Worked:
-            block = source.read(place)
+            block, not_finite_in = admitted(source.read(place), nonfinite, label)
             data, kinds = transform.tallied(block.data)
             result = block._replace(data=data)
             display = block._replace(data=to_display(result.data)) if to_display else result
@@ -148,7 +159,7 @@ def run(
             return _Worked(
                 pixels=place.height * place.width,
                 encoded=encoded,
-                not_finite_in=not_finite(block.data),
+                not_finite_in=not_finite_in,
                 not_finite_out=not_finite(result.data),
                 beyond_slopes=steeper(block.data, source.samples, transform.channels_in, last_slope),
                 kinds=kinds,
@@ -180,12 +191,14 @@ def run_on_cluster(
     *,
     overwrite: bool,
     last_slope: float | None = None,
+    nonfinite: NonFinite = "keep",
 ) -> Done:
     """As `run`, on the machines of a cluster (`iccbrdf.cluster`), into one TIFF."""
     from iccbrdf.cluster import apply
 
     if len(outputs) != 1 or outputs[0].is_png or outputs[0].is_exr:
         raise UsageError("a cluster writes one TIFF; make pictures and copies of it")
+    transform.check_cost(source.height * source.width)
     (output,) = outputs
     if output.compression:
         raise UsageError("a cluster writes no compressed TIFF, as nobody knows before where a block belongs")
@@ -198,6 +211,7 @@ def run_on_cluster(
         profile=output.profile,
         last_slope=last_slope,
         overwrite=overwrite,
+        nonfinite=nonfinite,
     )
     written = [{"path": str(output.path), "clipped": met.clipped}]
     return Done(written, met.not_finite_in, met.not_finite_out, met.beyond_slopes)

@@ -22,7 +22,7 @@ from iccbrdf.cmm.join import join, media_white
 from iccbrdf.cmm.resolve import INTERPOLATIONS
 from iccbrdf.cmm.stages import INTENTS, Stage, stages
 from iccbrdf.cmm.steps import Process, Step
-from iccbrdf.cmm.transform import Transform
+from iccbrdf.cmm.transform import MAX_COST, Transform
 from iccbrdf.errors import UsageError, nearest
 from iccbrdf.icc import Profile, read_profile
 
@@ -43,6 +43,7 @@ def link(
     spectral: bool = True,
     effects: str | Collection[str] = "full",
     without: Collection[str] = (),
+    max_cost: float = MAX_COST,
 ) -> Transform:
     """Link v5 profiles, paths or objects, into one transform.
 
@@ -83,11 +84,15 @@ def link(
         `chromatic-roughness`): the others of these four are left out.
     without
         Names of effects, of these four, to leave out: their multiplex channels take values that do nothing.
+    max_cost
+        Operators on single numbers that pixels may take in all; the transform refuses more with LimitError.
 
     Raises
     ------
     ProfileError
         A profile is malformed, or a program in it is unsafe.
+    LimitError
+        A profile is beyond a limit.
     LinkError
         Two profiles do not fit together, or a channel is nowhere.
     VariableError
@@ -105,6 +110,8 @@ def link(
         raise UsageError(f"channels: found {channels!r}, expected a sequence of names")
     if not isinstance(threads, (int, np.integer)) or threads < 1:
         raise UsageError(f"threads is {threads!r}, expected a whole number of at least 1")
+    if not isinstance(max_cost, (int, float, np.number)) or not max_cost > 0:
+        raise UsageError(f"max_cost is {max_cost!r}, expected a number above 0")
     chain = [p if isinstance(p, Profile) else read_profile(p) for p in profiles]
     if not chain:
         raise UsageError("no profile to link")
@@ -150,6 +157,7 @@ def link(
         wanted=backend,
         threads=int(threads),
         adaptive=chosen.adaptive,
+        max_cost=float(max_cost),
     )
     if backend != "auto":
         # Asked for by name: whether it can run is said now, not with the first pixel.

@@ -14,8 +14,12 @@ import numpy.typing as npt
 from iccbrdf.cmm.adaptive import adaptive_execution
 from iccbrdf.cmm.environment import checked_environment
 from iccbrdf.cmm.execution import Execution, Tally, execution, parts
-from iccbrdf.cmm.steps import Step
-from iccbrdf.errors import InputError
+from iccbrdf.cmm.steps import Process, Step
+from iccbrdf.errors import InputError, LimitError
+
+MAX_COST = 1e14
+"""Operators on single numbers for all pixels together, unless the caller allows more: a day on one processor.
+The longest program of ours runs within it on a hundred gigapixels."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,8 @@ class Transform:
     threads: int
     adaptive: bool = False
     """Whether each tile runs as little of the chain as it calls for (cmm/adaptive.py)."""
+    max_cost: float = MAX_COST
+    """What `cost` may be at most."""
 
     @property
     def execution(self) -> Execution:
@@ -56,11 +62,24 @@ class Transform:
         """The back end that runs the chain."""
         return self.execution.backend
 
+    def cost(self, pixels: int) -> int:
+        """Operators on single numbers that so many pixels take at most, those of elements included."""
+        return pixels * sum(step.work if isinstance(step, Process) else 1 for step in self.steps)
+
+    def check_cost(self, pixels: int) -> None:
+        """LimitError where so many pixels, of an array or of a whole image, cost more than `max_cost`."""
+        cost = self.cost(pixels)
+        if cost > self.max_cost:
+            raise LimitError(
+                f"{pixels} pixels take {cost:.3g} operations of these profiles' programs, the limit is "
+                f"{self.max_cost:.3g}; allow more with --max-cost (max_cost in Python) if that is meant"
+            )
+
     def __call__(self, array: npt.ArrayLike) -> npt.NDArray[np.floating[Any]]:
         """`array` (..., channels in) through the chain, in the dtype of the transform.
 
         Integers are taken as the numbers that they are: 255 is not 1.  Raises InputError where the array
-        holds no real numbers or the channels do not fit.
+        holds no real numbers or the channels do not fit, LimitError where it costs more than `max_cost`.
         """
         return self.tallied(array)[0]
 
@@ -81,6 +100,7 @@ class Transform:
                 + ", ".join(self.channels_in)
             )
         flat = pixels.reshape(-1, len(self.channels_in))
+        self.check_cost(len(flat))
         out = np.empty((len(flat), len(self.channels_out)), self.dtype)
         run = self.execution.bind(self.env)
 

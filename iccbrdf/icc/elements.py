@@ -252,6 +252,7 @@ class _Operations(FieldType):
 
     def read(self, reader: Reader, name: str, seen: Seen) -> Program:
         where = reader.where
+        reader.count_operations(seen["count"])
         return decode_ops(bytes(reader.take(8 * seen["count"], "operations")), where)
 
     def write(self, out: bytearray, value: Program, record: Any) -> None:

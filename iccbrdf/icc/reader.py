@@ -12,12 +12,16 @@ MAX_DEPTH = 32
 MAX_PARTS = 65_536
 """Elements, curves and members that one tag may hold; one that several positions share counts each time."""
 
+MAX_OPERATIONS = 1 << 18
+"""Of all calculator programs of one tag: each takes a hundred times its bytes when it is looked at."""
+
 
 class _Budget:
-    """How many parts one tag has used up so far."""
+    """How many parts and operations one tag has used up so far."""
 
     def __init__(self) -> None:
         self.spent = 0
+        self.operations = 0
 
 
 class Reader:
@@ -132,6 +136,12 @@ class Reader:
                 known[span] = value, self._budget.spent - before
             values.append(value)
         return values
+
+    def count_operations(self, count: int) -> None:
+        """Account for the operations of a program that is to be read; LimitError where they are too many."""
+        self._budget.operations += count
+        if self._budget.operations > MAX_OPERATIONS:
+            raise LimitError(f"{self.where}: more operations in one tag than the limit of {MAX_OPERATIONS}")
 
     def _check_disjoint(self, spans: Sequence[tuple[int, int]], label: Callable[[int], str]) -> None:
         first_index = {span: index for index, span in reversed(list(enumerate(spans)))}

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from iccbrdf.brdf.models import NORMAL
-from iccbrdf.images.blocks import Array
+from iccbrdf.errors import InputError
+from iccbrdf.images.blocks import Array, Block
+
+NonFinite: TypeAlias = Literal["keep", "zero", "error"]
+"""What becomes of a pixel with samples that are not finite: it goes on, all its samples are 0, or no more."""
 
 
 def all_within(data: Array, limit: float) -> bool:
@@ -27,6 +32,27 @@ def not_finite(data: Array) -> int:
     if all_within(data, float(np.finfo(data.dtype).max)):
         return 0
     return data.size - int(np.count_nonzero(np.isfinite(data)))
+
+
+def admitted(block: Block, treatment: NonFinite, label: str) -> tuple[Block, int]:
+    """A block as it is to go on, and the number of its samples that are not finite.
+
+    Raises
+    ------
+    InputError
+        There is such a sample and the treatment is "error"; `label` names the image.
+    """
+    count = not_finite(block.data)
+    if not count or treatment == "keep":
+        return block, count
+    finite = np.isfinite(block.data)
+    if treatment == "zero":
+        return block._replace(data=np.where(finite.all(axis=-1, keepdims=True), block.data, 0)), count
+    y, x, channel = np.argwhere(~finite)[0]
+    raise InputError(
+        f"{label}: row {block.y0 + y}, column {block.x0 + x}, channel {channel}: found "
+        f"{float(block.data[y, x, channel]):g}, expected a finite number; --nonfinite says what else to do"
+    )
 
 
 def steeper(data: Array, samples: str, names: Sequence[str], limit: float | None) -> int:
