@@ -68,19 +68,26 @@ def command(
     PROOF is a TIFF as `iccbrdf apply` takes it, with the profiles that it goes through, or a folder of
     `iccbrdf proof`.  The page computes the profiles' program for every pixel on the graphics processor.
     """
-    from iccbrdf.viewer import make_display, make_page, read_print
+    from iccbrdf.viewer import make_display, make_page, read_folder, read_print
     from iccbrdf.viewer.cost import cost
 
     check_target(output, overwrite=force)
-    image, paths = (proof, profiles) if not proof.is_dir() else folder_contents(proof, profiles)
+    image, paths, name = proof, profiles, proof.stem
+    variables: dict[str, float] = {}
+    start = None
+    if proof.is_dir():
+        found = read_folder(proof)
+        image, paths, name, start = found.image, profiles or found.profiles, found.title, found.start
+        variables.update(found.env)
     if not paths:
         raise UsageError(f"{proof}: say by which profiles it is seen: -p MID -p MVIS")
+    variables |= environment(light, view, env)
     chain = [read_profile(path) for path in paths]
     shown_on = make_display(display)
     with open_tiff(image, samples) as source:
         names = _names(source, chain[0], channels)
-        shown = read_print(source, chain, names, environment(light, view, env), max_pixels=max_pixels)
-    page = make_page(shown, shown_on, title if title is not None else proof.stem or str(proof))
+        shown = read_print(source, chain, names, variables, max_pixels=max_pixels)
+    page = make_page(shown, shown_on, name if title is None else title, start)
     with atomic_output(output, overwrite=force) as temporary:
         temporary.write_text(page, encoding="utf-8")
     height, width = shown.size
@@ -118,18 +125,3 @@ def _names(source: ImageSource, first: Profile, channels: str | None) -> tuple[s
     declared = name_list(channels) if channels is not None else None
     found = arranged_channels(source, own, declared)
     return None if found is None else tuple(found)
-
-
-def folder_contents(folder: Path, profiles: tuple[Path, ...]) -> tuple[Path, tuple[Path, ...]]:
-    """The image and the profiles that a folder of `iccbrdf proof` holds for a page.
-
-    Raises UsageError where it kept neither the flat print nor the BRDF image as a TIFF.
-    """
-    for name, mid in (("flat.tif", "colour-mid.icc"), ("brdf.tif", None)):
-        if (folder / name).is_file():
-            own = tuple(folder / file for file in (mid, "mvis.icc") if file)
-            return folder / name, profiles or own
-    raise UsageError(
-        f"{folder}: neither flat.tif nor brdf.tif is in it; make the proof with --keep flat, which keeps what "
-        "a page is made of"
-    )

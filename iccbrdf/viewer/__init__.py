@@ -6,6 +6,17 @@ bits (`image`) -> XYZ in the fragment shader (`shader.glsl`) -> the display (`di
 """
 
 from iccbrdf.viewer.display import Display, make_display
-from iccbrdf.viewer.page import MAX_PIXELS, Print, make_page, read_print
+from iccbrdf.viewer.folder import ProofFolder, read_folder
+from iccbrdf.viewer.page import MAX_PIXELS, Print, Start, make_page, read_print
 
-__all__ = ["MAX_PIXELS", "Display", "Print", "make_display", "make_page", "read_print"]
+__all__ = [
+    "MAX_PIXELS",
+    "Display",
+    "Print",
+    "ProofFolder",
+    "Start",
+    "make_display",
+    "make_page",
+    "read_folder",
+    "read_print",
+]

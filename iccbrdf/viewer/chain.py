@@ -8,8 +8,8 @@ works with any model that has the channels.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,8 +30,8 @@ Array = npt.NDArray[Any]
 Convert = Callable[[Array], Array]
 
 RELIEF, GLOSS, GLOSS_COLOUR, SLOPE_COLOUR = EFFECTS = ("relief", "gloss", "gloss-colour", "slope-colour")
-"""What a page may leave out: the normals (the print is flat), specular reflection, a specular reflection other
-for X and Z than for Y, and the change of colours on slopes."""
+"""What a page may leave out: the normals (the print is flat), specular reflection, a specular reflection
+that for X and Z is another than for Y, and the change of colours on slopes."""
 
 _UP = dict(zip(NORMAL, (0.0, 0.0, 1.0), strict=True))
 _XYZ = ("X", "Y", "Z")
@@ -112,12 +112,16 @@ def brdf_chain(
 
 
 def _chain(
-    transform: Transform, mvis: Profile, convert: Convert, before: tuple[Step, ...], multiplex: tuple[str, ...]
+    transform: Transform,
+    mvis: Profile,
+    convert: Convert,
+    before: tuple[Step, ...],
+    multiplex: tuple[str, ...],
 ) -> Chain:
     if transform.channels_out not in (_XYZ, ("L*", "a*", "b*")):
         raise UsageError(
-            f"{mvis.source} gives {', '.join(transform.channels_out)}; a page needs a last profile that gives "
-            "XYZ or Lab, such as an MVIS"
+            f"{mvis.source} gives {', '.join(transform.channels_out)}; the last profile of a page gives "
+            "XYZ or Lab, as an MVIS does"
         )
     return Chain(
         channels=transform.channels_in,
@@ -157,20 +161,29 @@ def _rows(matrix: Any) -> tuple[Array, Array]:
 # Graphs ------------------------------------------------------------------------------------------------
 
 
-def display_graph(chain: Chain, without: Collection[str] = ()) -> Graph:
+class Graphs(NamedTuple):
+    """Of one chain, with the same nodes."""
+
+    display: Graph
     """From the channels of the image to XYZ under D50, where displays start."""
-    graph = Graph(dtype=np.float32)
-    _, own = _lifted(chain, graph, without)
-    return _optimised(graph, _run(standard_XYZ(chain.mvis).steps, graph, own))
+    pixel: Graph
+    """To XYZ under the MVIS's own conditions, and then the multiplex channels."""
 
 
-def pixel_graph(chain: Chain, without: Collection[str] = ()) -> Graph:
-    """From the channels of the image to XYZ under the MVIS's own conditions, and then the multiplex channels."""
+def graphs(chain: Chain, without: Collection[str] = ()) -> Graphs:
+    """The graphs of a chain without some of its effects.
+
+    Raises UnsupportedError where there is no graph of a step.
+    """
     graph = Graph(dtype=np.float32)
     channels, own = _lifted(chain, graph, without)
+    standard = _run(standard_XYZ(chain.mvis).steps, graph, own)
     if chain.mvis.header.pcs == "Lab ":
         own = _run([LabToXYZ(chain.white)], graph, own)
-    return _optimised(graph, [*own, *channels])
+    graph.outputs = (*standard, *own, *channels)
+    graph, _ = optimise(graph, _PASSES)
+    display, pixel = graph.outputs[: len(standard)], graph.outputs[len(standard) :]
+    return Graphs(replace(graph, outputs=display), replace(graph, outputs=pixel))
 
 
 def _lifted(chain: Chain, graph: Graph, without: Collection[str]) -> tuple[list[Node], list[Node]]:
@@ -214,11 +227,6 @@ def nothing_of(graph: Graph, node: Node) -> Node | None:
 
 
 _PASSES = (*EXACT_PASSES, ("finite numbers", (neutral, nothing_of)))
-
-
-def _optimised(graph: Graph, outputs: Sequence[Node]) -> Graph:
-    graph.outputs = tuple(outputs)
-    return optimise(graph, _PASSES)[0]
 
 
 def defaults(graph: Graph) -> dict[str, float]:

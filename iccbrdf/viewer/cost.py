@@ -9,8 +9,8 @@ from iccbrdf.viewer.page import Print
 
 WIDTH, HEIGHT = 1920, 1080
 OPERATIONS_A_SECOND = 4e11
-"""Of the graphics in a laptop's processor: about a third of the 1.2e12 or more that makers of such chips since
-2020 state, since few additions meet a multiplication that they could be fused with."""
+"""Of the graphics in a laptop's processor: about a third of the 1.2e12 or more that makers of such chips
+state, since few additions meet a multiplication that they could be fused with."""
 BYTES_A_SECOND = 3e10
 """Of its memory: half of what two channels of DDR4-3200 can do."""
 

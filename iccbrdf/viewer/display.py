@@ -72,7 +72,8 @@ vec3 shown(vec3 xyz) {{
 _LOOKED_UP = f"""vec3 coded = pow(clamp(wide(xyz), 0.0, 1.0), vec3({literal(_CODED)}));
   return textureLod(table, (coded * {NODES - 1}.0 + 0.5) / {NODES}.0, 0.0).rgb;"""
 _CURVE = """vec3 linear = clamp(own(xyz), 0.0, 1.0);
-  return mix(12.92 * linear, 1.055 * pow(max(linear, 1e-3), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, linear));"""
+  vec3 curved = 1.055 * pow(max(linear, 1e-3), vec3(1.0 / 2.4)) - 0.055;
+  return mix(12.92 * linear, curved, step(0.0031308, linear));"""
 
 
 def _by_formula(profile: Profile) -> str:

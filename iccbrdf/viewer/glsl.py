@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from iccbrdf.calc.graph import Node, is_truth
 from iccbrdf.calc.schedule import Schedule, computed
-from iccbrdf.viewer.straight import Language, name_of, numbers, statements
+from iccbrdf.viewer.straight import Language, Writer
 
 
 def literal(value: float) -> str:
@@ -32,8 +33,8 @@ GLSL = Language(
     name="GLSL",
     patterns={
         "neg": "-{0}", "abs": "abs({0})", "sqrt": "sqrt({0})", "cbrt": "cubeRoot({0})",
-        "flor": "floor({0})", "ceil": "ceil({0})", "trnc": "trunc({0})",
-        "rond": "sign({0}) * floor(abs({0}) + 0.5)", "sign": "sign({0})",
+        "flor": "floor({0})", "ceil": "ceil({0})", "trnc": "truncated({0})",
+        "rond": "rounded({0})", "sign": "sign({0})",
         "exp": "exp({0})", "log": "0.434294482 * logarithm({0})", "ln": "logarithm({0})",
         "sin": "sine({0})", "cos": "cosine({0})", "tan": "(sine({0}) / cosine({0}))",
         "asin": "angle(sqrt((1.0 - {0}) * (1.0 + {0})), {0})",
@@ -76,16 +77,24 @@ FUNCTIONS = {
   float b = sign(a) * exp2(log2(abs(a)) * 0.333333333);
   return b - (b * b * b - a) / (3.0 * b * b);
 }""",
+    # As C's cast, which gives the least integer for what does not fit.
+    "truncated": """float truncated(float a) {
+  return abs(a) < 2147483648.0 ? trunc(a) : -2147483648.0;
+}""",
+    "rounded": """float rounded(float a) {
+  return abs(a) < 2147483648.0 ? sign(a) * floor(abs(a) + 0.5) : -2147483648.0;
+}""",
     "remainder": """float remainder(float a, float b) {
   if (b == 0.0) return a;
   float rest = abs(a) - abs(b) * floor(abs(a) / abs(b));
   rest = rest < 0.0 ? rest + abs(b) : rest >= abs(b) ? rest - abs(b) : rest;
   return a < 0.0 ? -rest : rest;
 }""",
-    # Taylor series, to the last bit within an eighth of a turn; the turns are taken off in two parts.
+    # Taylor series, to the last bit within an eighth of a turn; the quarters are taken off in parts that are
+    # exact (W. Cody, W. Waite: Software manual for the elementary functions, 1980).
     "wave": """float wave(float a, int shift) {
   float turns = floor(a * 0.636619772 + 0.5);
-  float r = (a - turns * 1.5707963) - turns * 2.67948966e-8;
+  float r = ((a - turns * 1.5703125) - turns * 4.83751297e-4) - turns * 7.54978995e-8;
   int quarter = (int(turns) + shift) & 3;
   float s = r * r;
   float odd = r * (1.0 + s * (-0.166666667 + s * (8.33333333e-3 + s * (-1.98412698e-4 + s * 2.75573192e-6))));
@@ -112,18 +121,20 @@ FUNCTIONS = {
 
 
 def function_body(
-    plan: Schedule, inputs: Mapping[int, str], results: Sequence[str], arguments: str
+    plan: Schedule, results: Sequence[str], arguments: str, gaps: Collection[int] = ()
 ) -> str:
-    """The statements that assign the outputs of a schedule.
+    """The statements that assign the outputs of a schedule; 0 to those that are no number.
+
+    They read `channel(k, at)` and, of the channels in `gaps`, `isGap(k, at)`.
 
     Parameters
     ----------
-    inputs
-        An expression of type float for each input channel that is read.
     results
         What the outputs are assigned to, in order.
     arguments
         The name of the array of floats that holds the values of the schedule's arguments.
+    gaps
+        The channels that may hold NaN.  What depends on them is accompanied by whether it is a NaN.
 
     Raises
     ------
@@ -131,17 +142,75 @@ def function_body(
         A node that GLSL has no counterpart for: a table, a curve or `solv`.
     """
     nodes = list(computed(plan.body))
-    read = {node: inputs[node.detail] for node in nodes if node.op == "input"}
-    known = {
-        node: f"({arguments}[{k}] > 0.5)" if is_truth(node) else f"{arguments}[{k}]"
-        for k, node in enumerate(plan.arguments)
-    }
-    lines = [f"float {name_of(node)} = {text};" for node, text in read.items()]
-    known |= {node: name_of(node) for node in read}
-    lines += statements(GLSL, nodes, known)
-    outputs = numbers(GLSL, plan.graph.outputs, known)
-    lines += [f"{result} = {value};" for result, value in zip(results, outputs, strict=True)]
+    writer = Writer(
+        GLSL,
+        {
+            node: f"({arguments}[{k}] > 0.5)" if is_truth(node) else f"{arguments}[{k}]"
+            for k, node in enumerate(plan.arguments)
+        },
+    )
+    missing = _Missing(writer, {})
+    lines: list[str] = []
+    for node in nodes:
+        if node.op == "input":
+            lines.append(writer.declaration(node, f"channel({node.detail}, at)"))
+            if node.detail in gaps:
+                lines.append(missing.flagged(node, f"isGap({node.detail}, at)"))
+        else:
+            lines += missing.lines(node)
+    for result, node in zip(results, plan.graph.outputs, strict=True):
+        guard = f"{missing.flags[node]} ? 0.0 : " if node in missing.flags else ""
+        lines.append(f"{result} = {guard}{writer.number(node)};")
     return "\n".join(f"  {line}" for line in lines)
+
+
+@dataclass(frozen=True)
+class _Missing:
+    """Which nodes are NaN because a channel is, told by conditions of their own.
+
+    It follows what the interpreter does with NaN: comparisons are false, `vmin` and `vmax` then give their
+    second argument, and a select the side that it takes.
+    """
+
+    writer: Writer
+    flags: dict[Node, str]
+    """The names of the conditions."""
+
+    def flagged(self, node: Node, condition: str) -> str:
+        """The line that declares a node's condition."""
+        self.flags[node] = f"n{node.index}"
+        return f"bool {self.flags[node]} = {condition};"
+
+    def lines(self, node: Node) -> list[str]:
+        """The declarations of a node and of its condition."""
+        writer, flags = self.writer, [self.flags.get(argument) for argument in node.arguments]
+        known = [flag for flag in flags if flag]
+        if not known:
+            return [writer.declaration(node)]
+        some, texts = " || ".join(known), writer.arguments(node)
+        if node.op in ("eq", "neq"):
+            # A NaN equals a NaN.
+            alike = f"{flags[0] or 'false'} == {flags[1] or 'false'}"
+            equal = f"(({some}) ? {alike} : same({texts[0]}, {texts[1]}))"
+            return [writer.declaration(node, equal if node.op == "eq" else f"!{equal}")]
+        own = writer.expression(node)
+        if is_truth(node):
+            return [writer.declaration(node, f"!({some}) && {own}")]
+        if node.op in _OF_NAN:
+            return [writer.declaration(node, f"({some} ? {literal(_OF_NAN[node.op])} : {own})")]
+        if node.op in ("vmin", "vmax"):
+            line = writer.declaration(node, f"(({some}) ? {texts[1]} : {own})")
+            return [line, self.flagged(node, flags[1])] if flags[1] else [line]
+        if node.op == "select":
+            some = f"{texts[0]} ? {flags[1] or 'false'} : {flags[2] or 'false'}"
+        elif node.op == "pow":
+            base, exponent = (flag or "false" for flag in flags)
+            some = f"({base} && {texts[1]} != 0.0) || ({exponent} && ({base} || {texts[0]} != 1.0))"
+        return [writer.declaration(node), self.flagged(node, some)]
+
+
+_OF_NAN = {"sign": 0.0, "rond": -(2.0**31), "trnc": -(2.0**31)}
+"""What operators give that make a number of NaN."""
 
 
 def functions_for(text: str) -> str:

@@ -31,7 +31,7 @@ _LEVEL = 6
 def reduced(
     source: ImageSource, convert: Callable[[Array], Array], channels: int, max_pixels: int
 ) -> tuple[Array, int]:
-    """The image of `source`, converted block by block, at most `max_pixels` large, and what it was divided by.
+    """The image of `source`, at most `max_pixels` large, and what its height and width were divided by.
 
     Parameters
     ----------
@@ -106,7 +106,9 @@ class Layer:
     def decoded(self) -> npt.NDArray[np.float32]:
         """The samples as the page has them."""
         steps = self.codes.astype(np.float32) - np.float32(self.zero)
-        return np.where(self.codes == NOT_FINITE, np.float32(np.nan), steps * np.float32(self.scale))
+        samples: npt.NDArray[np.float32] = steps * np.float32(self.scale)
+        samples[self.codes == NOT_FINITE] = np.nan
+        return samples
 
     def packed(self) -> str:
         """Base64 text of the codes."""

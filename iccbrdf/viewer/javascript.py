@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable, Mapping
 
 from iccbrdf.calc.graph import Graph, Node
 from iccbrdf.calc.schedule import Schedule
-from iccbrdf.viewer.straight import Language, numbers, statements
+from iccbrdf.viewer.straight import Language, Writer, statements
 
 
 def literal(value: float) -> str:
@@ -20,12 +21,16 @@ def literal(value: float) -> str:
     return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "(-Infinity)"
 
 
+_CAST = "(Math.abs({{0}}) < 2147483648 ? {} : -2147483648)"
+"""As C's cast to an integer gives the least one for what does not fit."""
+
 JAVASCRIPT = Language(
     name="JavaScript",
     patterns={
         "neg": "-{0}", "abs": "Math.abs({0})", "sqrt": "Math.sqrt({0})", "cbrt": "Math.cbrt({0})",
-        "flor": "Math.floor({0})", "ceil": "Math.ceil({0})", "trnc": "Math.trunc({0})",
-        "rond": "Math.sign({0}) * Math.floor(Math.abs({0}) + 0.5)", "sign": "(({0} > 0) - ({0} < 0))",
+        "flor": "Math.floor({0})", "ceil": "Math.ceil({0})", "trnc": _CAST.format("Math.trunc({0})"),
+        "rond": _CAST.format("Math.sign({0}) * Math.floor(Math.abs({0}) + 0.5)"),
+        "sign": "(({0} > 0) - ({0} < 0))",
         "exp": "Math.exp({0})", "log": "Math.log10({0})", "ln": "Math.log({0})",
         "sin": "Math.sin({0})", "cos": "Math.cos({0})", "tan": "Math.tan({0})",
         "asin": "Math.asin({0})", "acos": "Math.acos({0})", "atan": "Math.atan({0})",
@@ -51,14 +56,19 @@ def uniforms_function(plan: Schedule) -> str:
     """A function from the run-time variables, an object by name, to the arguments of the body."""
     known = _variables(plan.graph)
     lines = statements(JAVASCRIPT, plan.uniform, known)
-    return _function("env", lines, numbers(JAVASCRIPT, plan.arguments, known))
+    return _function("env", lines, _numbers(plan.arguments, known))
 
 
 def pixel_function(graph: Graph) -> str:
     """A function from the run-time variables and the channels of a pixel to all outputs of `graph`."""
     live = graph.live()
     known = _variables(graph) | {node: f"x[{node.detail}]" for node in live if node.op == "input"}
-    return _function("env, x", statements(JAVASCRIPT, live, known), numbers(JAVASCRIPT, graph.outputs, known))
+    return _function("env, x", statements(JAVASCRIPT, live, known), _numbers(graph.outputs, known))
+
+
+def _numbers(nodes: Iterable[Node], known: Mapping[Node, str]) -> list[str]:
+    writer = Writer(JAVASCRIPT, known)
+    return [writer.number(node) for node in nodes]
 
 
 def _variables(graph: Graph) -> dict[Node, str]:

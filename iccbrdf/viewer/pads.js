@@ -109,9 +109,9 @@ class Pad {
 }
 
 const PRESETS = [
-  { name: "Left", title: "Raking light from the left (1)", light: [80, 180], view: [0, 0], lamp: [-15, -4], eye: [0, -20] },
-  { name: "Right", title: "Raking light from the right (2)", light: [80, 0], view: [0, 0], lamp: [15, -4], eye: [0, -20] },
-  { name: "Top", title: "Raking light from the top (3)", light: [80, 90], view: [0, 0], lamp: [6, -7], eye: [0, -20] },
+  { name: "Left", title: "Raking light from the left (1)", light: [74, 180], view: [0, 0], lamp: [-15, -4], eye: [0, -20] },
+  { name: "Right", title: "Raking light from the right (2)", light: [74, 0], view: [0, 0], lamp: [15, -4], eye: [0, -20] },
+  { name: "Top", title: "Raking light from the top (3)", light: [74, 90], view: [0, 0], lamp: [6, -7], eye: [0, -20] },
   { name: "0/45", title: "Light at 45 degrees, seen from above, as prints are measured (4)", light: [45, 180], view: [0, 0],
     lamp: [-13, -13], eye: [0, -20] },
   { name: "Mirror", title: "Seen where a flat print mirrors the light (5)", light: [40, 90], view: [40, 270],

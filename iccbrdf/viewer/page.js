@@ -10,13 +10,14 @@ const EFFECT_NAMES = {
 };
 const STILL_AFTER = 180; // ms without a change, after which the picture is drawn at its best
 const SLOW = 45; // ms a frame, from which a moving picture is drawn coarser
+const LOWEST = 0.1; // cosine of the lowest light that the automatic lamp makes up for
 
 const initial = () => ({
   lights: [unit(page.light), mirrored(unit(page.light))],
   active: 0,
   view: unit(page.view),
   intensity: 0,
-  exposure: 0,
+  ...page.start,
   without: new Set(),
   compare: "none",
   divider: 0.5,
@@ -26,7 +27,7 @@ const mirrored = ([x, y, z]) => (Math.hypot(x, y) < 0.05 ? fromAngles(60, 0) : [
 let state = initial();
 let camera = { x: page.width / 2, y: page.height / 2, scale: 1, fitted: true };
 let renderer = null, layers = [], pointer = null;
-let asked = false, changedAt = 0, drawnAt = 0, frameTime = null, coarse = 1;
+let asked = false, inFlight = false, refining = 0, changedAt = 0, frameTime = null, coarse = 1;
 
 // What is drawn ------------------------------------------------------------------------------------------------
 
@@ -35,7 +36,10 @@ function envOf(k) {
   const set = (names, vector) => names.forEach((name, i) => { if (page.variables.includes(name)) env[name] = vector[i]; });
   set(["litX", "litY", "litZ"], state.lights[k]);
   set(["vueX", "vueY", "vueZ"], state.view);
-  if (page.intensity !== null) env.litI = page.intensity * 2 ** state.intensity;
+  if (page.intensity !== null) {
+    const sunk = state.auto ? Math.max(LOWEST, state.lights[k][2]) : 1;
+    env.litI = (page.intensity * 2 ** state.intensity) / sunk;
+  }
   return env;
 }
 
@@ -54,27 +58,36 @@ function views() {
 
 function change() {
   changedAt = performance.now();
-  if (!asked) {
-    asked = true;
-    requestAnimationFrame(frame);
-  }
+  ask();
 }
 
-function frame(now) {
+function ask() {
+  if (asked) return;
+  asked = true;
+  requestAnimationFrame(frame);
+}
+
+// One frame at a time: what changes while the graphics processor works is in the next one.
+function frame() {
+  if (inFlight) return;
   asked = false;
   if (!renderer || renderer.gl.isContextLost()) return;
-  const still = now - changedAt > STILL_AFTER;
-  measureFrame(now, still);
+  const still = performance.now() - changedAt > STILL_AFTER;
   draw(still);
-  drawnAt = now;
-  if (!still) setTimeout(() => { if (!asked) { asked = true; requestAnimationFrame(frame); } }, STILL_AFTER + 10);
+  clearTimeout(refining);
+  if (!still) refining = setTimeout(ask, STILL_AFTER + 20);
+  inFlight = true;
+  const begun = performance.now();
+  renderer.finished(() => {
+    inFlight = false;
+    if (!still) measured(performance.now() - begun);
+    if (asked) requestAnimationFrame(frame);
+  });
 }
 
-// The time from one frame to the next while the picture moves; slow devices draw it coarser.
-function measureFrame(now, still) {
-  const passed = now - drawnAt;
-  if (still || passed > 500) return;
-  frameTime = frameTime === null ? passed : 0.8 * frameTime + 0.2 * passed;
+// The time of a frame while the picture moves; slow devices then draw it coarser.
+function measured(time) {
+  frameTime = frameTime === null ? time : 0.7 * frameTime + 0.3 * time;
   if (frameTime > SLOW && coarse < 4) {
     coarse *= 2;
     frameTime = null;
@@ -91,7 +104,7 @@ function draw(still) {
   const scale = camera.scale * shrink;
   const corner = { column: camera.x - (width / 2) * scale, row: camera.y - (height / 2) * scale, scale };
   const finest = scale > 1 ? Math.min(4, Math.ceil(scale)) : Number.isInteger(1 / scale) ? 1 : 2;
-  renderer.draw(views(), corner, 2 ** state.exposure, still ? finest : Math.min(finest, 2));
+  renderer.draw(views(), corner, 2 ** state.exposure, state.soft, still ? finest : Math.min(finest, 2));
 }
 
 // Zoom and pan -------------------------------------------------------------------------------------------------
@@ -146,6 +159,8 @@ function listenToPicture() {
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     touches.set(event.pointerId, event);
+    pointer = [event.clientX, event.clientY];
+    showPixel();
   });
   canvas.addEventListener("pointermove", (event) => {
     pointer = [event.clientX, event.clientY];
@@ -163,7 +178,11 @@ function listenToPicture() {
     touches.set(event.pointerId, event);
   });
   for (const end of ["pointerup", "pointercancel"]) {
-    canvas.addEventListener(end, (event) => touches.delete(event.pointerId));
+    canvas.addEventListener(end, (event) => {
+      touches.delete(event.pointerId);
+      if (event.pointerType === "touch") pointer = null;
+      showPixel();
+    });
   }
   canvas.addEventListener("pointerleave", (event) => {
     if (event.pointerType === "mouse") pointer = null;
@@ -205,6 +224,16 @@ function button(parent, className, text, clicked) {
   element.textContent = text;
   element.addEventListener("click", clicked);
   parent.append(element);
+  return element;
+}
+
+function toggle(parent, text, turned) {
+  const element = button(parent, "switch", "", () => {
+    turned();
+    update();
+  });
+  element.setAttribute("role", "switch");
+  element.append(document.createElement("i"), text, document.createElement("small"));
   return element;
 }
 
@@ -300,14 +329,18 @@ function build() {
     element.setAttribute("role", "radio");
     element.dataset.value = value;
   }
+  const auto = toggle(byId("switches"), "Auto lamp", () => { state.auto = !state.auto; });
+  auto.id = "auto";
+  auto.title = "The lower the lamp, the brighter: a flat print stays as it is";
+  auto.hidden = page.intensity === null;
+  const soft = toggle(byId("switches"), "Soft highlights", () => { state.soft = !state.soft; });
+  soft.id = "soft";
+  soft.title = "Highlights above white are compressed instead of cut off";
   for (const effect of page.effects) {
-    const element = button(byId("effects"), "", "", () => {
+    const element = toggle(byId("effects"), EFFECT_NAMES[effect], () => {
       if (!state.without.delete(effect)) state.without.add(effect);
-      update();
     });
-    element.setAttribute("role", "switch");
     element.dataset.effect = effect;
-    element.append(document.createElement("i"), EFFECT_NAMES[effect], document.createElement("small"));
   }
   byId("size").textContent = page.size;
   byId("about").textContent = page.about;
@@ -337,6 +370,7 @@ function update() {
     byId(id).hidden = !names;
     byId(id).textContent = names?.[k] ?? "";
   });
+  for (const name of ["auto", "soft"]) byId(name).setAttribute("aria-checked", state[name]);
   showEffects();
   showCost();
   showPixel();
@@ -346,7 +380,7 @@ function update() {
 const operations = (without) => page.programs[programOf(without)].operations;
 
 function showEffects() {
-  for (const element of byId("effects").children) {
+  for (const element of byId("effects").querySelectorAll("button")) {
     const { effect } = element.dataset;
     const others = new Set(state.without);
     others.delete(effect);
@@ -389,6 +423,7 @@ async function start() {
   });
   canvas.addEventListener("webglcontextrestored", () => {
     renderer.start();
+    inFlight = asked = false;
     say("");
     change();
   });
@@ -406,5 +441,15 @@ globalThis.proof = {
   program: (...without) => programOf(without),
   get renderer() { return renderer; },
   pixel: (program, env, column, row) => pixelValues(page, layers, program, env, column, row),
-  draw: () => draw(true),
+  // Resolves when everything that was changed is on the canvas, at its best.
+  settled: async () => {
+    const over = () => !asked && !inFlight && performance.now() - changedAt > STILL_AFTER + 60;
+    while (!over()) await new Promise((resolve) => setTimeout(resolve, 20));
+  },
+  // Milliseconds of a frame of the whole window.
+  time: () => new Promise((resolve) => {
+    const begun = performance.now();
+    draw(false);
+    renderer.finished(() => resolve(performance.now() - begun));
+  }),
 };

@@ -10,6 +10,7 @@ import base64
 import hashlib
 import html
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,11 +21,11 @@ from iccbrdf.errors import InputError, LinkError, UnsupportedError
 from iccbrdf.icc import Profile
 from iccbrdf.images import ImageSource
 from iccbrdf.scene import LIGHT, VIEW
-from iccbrdf.viewer.chain import Chain, brdf_chain, defaults, display_graph, whole_chain
+from iccbrdf.viewer.chain import Chain, brdf_chain, defaults, graphs, whole_chain
 from iccbrdf.viewer.display import NODES, Display
 from iccbrdf.viewer.glsl import functions_for, literal
 from iccbrdf.viewer.image import Layer, layers, reduced
-from iccbrdf.viewer.programs import ARGUMENTS, Program, Programs, make_programs
+from iccbrdf.viewer.programs import Program, Programs, make_programs
 
 MAX_PIXELS = 4_000_000
 """Of a page: some 70 MB and three seconds to open; browsers are slow to read longer texts."""
@@ -52,6 +53,25 @@ class Print:
         """Height and width of the page's image."""
         height, width = self.layers[0].codes.shape
         return height, width
+
+
+@dataclass(frozen=True)
+class Start:
+    """What is set when the page is opened, besides light and view.
+
+    Attributes
+    ----------
+    auto_lamp
+        Whether the lamp is the brighter the lower it stands, so that a flat print stays as bright.
+    soft_highlights
+        Whether highlights are rolled off (iccbrdf.images.showing) instead of clipped.
+    exposure
+        Factor on XYZ.
+    """
+
+    auto_lamp: bool = False
+    soft_highlights: bool = False
+    exposure: float = 1.0
 
 
 def read_print(
@@ -108,9 +128,10 @@ def read_print(
     return Print(chain, coded, programs, divisor, (source.height, source.width), run_now)
 
 
-def make_page(shown: Print, display: Display, title: str) -> str:
+def make_page(shown: Print, display: Display, title: str, start: Start | None = None) -> str:
     """The text of the page."""
-    page = _without_tags(json.dumps(_page(shown, display, title), separators=(",", ":")))
+    values = _page(shown, display, title, start or Start())
+    page = _without_tags(json.dumps(values, separators=(",", ":")))
     style = _file("page.css")
     script = "\n".join([_functions(shown.programs), *map(_file, _SCRIPTS)])
     policy = (
@@ -142,9 +163,9 @@ def shader(program: Program, coded: Sequence[Layer], display: Display) -> str:
     return re.sub(r"\b(" + "|".join(parts) + r")\b", lambda found: parts[found[1]], _file("shader.glsl"))
 
 
-def _page(shown: Print, display: Display, title: str) -> dict[str, Any]:
+def _page(shown: Print, display: Display, title: str, start: Start) -> dict[str, Any]:
     chain, (height, width) = shown.chain, shown.size
-    known = {**defaults(display_graph(chain)), **chain.env}
+    known = {**defaults(graphs(chain).display), **chain.env}
     return {
         "title": title,
         "width": width,
@@ -161,6 +182,11 @@ def _page(shown: Print, display: Display, title: str) -> dict[str, Any]:
         "light": [known.get(name, 0.0) for name in LIGHT],
         "view": [known.get(name, 0.0) for name in VIEW] if VIEW[2] in known else [0, 0, 1],
         "intensity": known.get(_INTENSITY) if _INTENSITY in chain.variables else None,
+        "start": {
+            "auto": start.auto_lamp,
+            "soft": start.soft_highlights,
+            "exposure": math.log2(start.exposure),
+        },
         "effects": shown.programs.effects,
         "of": {",".join(without): index for without, index in _every_choice(shown.programs)},
         "programs": [

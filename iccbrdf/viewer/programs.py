@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from itertools import chain as joined
 from itertools import combinations
 
-from iccbrdf.calc.graph import Node, needed_by
-from iccbrdf.calc.schedule import Schedule, computed, schedule
-from iccbrdf.viewer.chain import EFFECTS, Chain, display_graph, pixel_graph
+from iccbrdf.calc.schedule import computed, schedule
+from iccbrdf.viewer.chain import EFFECTS, Chain, graphs
 from iccbrdf.viewer.glsl import function_body
 from iccbrdf.viewer.javascript import pixel_function, uniforms_function
 
 ARGUMENTS = "u"
-"""The array of a program's arguments in GLSL."""
+RESULTS = ("xyz.x", "xyz.y", "xyz.z")
+"""What a program's body reads and sets (shader.glsl)."""
 
 _WEIGHT = {
     "div": 4, "sqrt": 4, "exp": 5, "ln": 6, "log": 6, "cbrt": 16, "pow": 12, "mod": 12, "sin": 16, "cos": 16,
@@ -56,7 +56,7 @@ class Program:
 
 @dataclass(frozen=True)
 class Programs:
-    """The programs of a page; `of` gives for each choice of effects left out, sorted, the index of its own."""
+    """The programs of a page; `of` gives the index of one for each choice of effects left out."""
 
     effects: tuple[str, ...]
     programs: tuple[Program, ...]
@@ -71,14 +71,16 @@ class Programs:
 def make_programs(chain: Chain, gaps: Collection[int] = ()) -> Programs:
     """The programs for all choices of the effects that the chain has.
 
-    `gaps` are the channels, by position, with samples that are not finite.  Raises UnsupportedError where a graph holds what GLSL or JavaScript cannot say.
+    `gaps` are the channels, by position, with samples that are not finite.  Raises UnsupportedError where a
+    graph holds what GLSL or JavaScript cannot say.
     """
     whole = _program(chain, gaps, ())
-    effects = tuple(e for e in EFFECTS if _program(chain, gaps, (e,)).body != whole.body)
-    programs: list[Program] = []
-    of: dict[tuple[str, ...], int] = {}
-    for without in joined.from_iterable(combinations(effects, n) for n in range(len(effects) + 1)):
-        program = _program(chain, gaps, without)
+    single = {effect: _program(chain, gaps, (effect,)) for effect in EFFECTS}
+    effects = tuple(effect for effect, program in single.items() if program.body != whole.body)
+    programs = [whole]
+    of: dict[tuple[str, ...], int] = {(): 0}
+    for without in joined.from_iterable(combinations(effects, n) for n in range(1, len(effects) + 1)):
+        program = single[without[0]] if len(without) == 1 else _program(chain, gaps, without)
         if program not in programs:
             programs.append(program)
         of[without] = programs.index(program)
@@ -86,27 +88,12 @@ def make_programs(chain: Chain, gaps: Collection[int] = ()) -> Programs:
 
 
 def _program(chain: Chain, gaps: Collection[int], without: tuple[str, ...]) -> Program:
-    plan = schedule(display_graph(chain, without), len(chain.channels))
+    display, pixel = graphs(chain, without)
+    plan = schedule(display, len(chain.channels))
     return Program(
-        body=_body(plan, gaps),
+        body=function_body(plan, RESULTS, ARGUMENTS, gaps),
         uniforms=uniforms_function(plan),
         arguments=len(plan.arguments),
-        pixel=pixel_function(pixel_graph(chain, without)),
+        pixel=pixel_function(pixel),
         nodes=Counter(node.op for node in computed(plan.body)),
     )
-
-
-def _body(plan: Schedule, gaps: Collection[int]) -> str:
-    results = ["xyz.x", "xyz.y", "xyz.z"]
-    inputs = {k: f"channel({k}, at)" for k in range(plan.channels)}
-    body = function_body(plan, inputs, results, ARGUMENTS)
-    for result, node in zip(results, plan.graph.outputs, strict=True):
-        read = sorted(_inputs_of(node).intersection(gaps))
-        if read:
-            missing = " || ".join(f"isGap({k}, at)" for k in read)
-            body += f"\n  if ({missing}) {result} = 0.0;"
-    return body
-
-
-def _inputs_of(output: Node) -> set[int]:
-    return {node.detail for node in needed_by([output]) if node.op == "input"}

@@ -36,24 +36,24 @@ function pixelValues(page, layers, program, env, column, row) {
 
 function showReadout(element, values) {
   element.replaceChildren();
-  const cell = (text, className) => {
-    const item = document.createElement(className === "name" ? "b" : "span");
+  const cell = (text, kind, ...classes) => {
+    const item = document.createElement(kind);
     item.textContent = text;
-    if (className === "wide") item.className = "wide";
+    item.classList.add(...classes);
     element.append(item);
   };
-  const row = (name, numbers, digits) => {
-    cell(name, "name");
+  const row = (name, numbers, digits, ...classes) => {
+    cell(name, "b", ...classes);
     const texts = numbers.map((value) => (Number.isFinite(value) ? value.toFixed(digits) : "\u2013"));
-    if (numbers.length === 3) texts.forEach((text) => cell(text));
-    else cell(texts.join("  "), "wide");
+    if (numbers.length === 3) texts.forEach((text) => cell(text, "span", ...classes));
+    else cell(texts.join("  "), "span", "wide", ...classes);
   };
   row("XYZ", values.xyz.map((value) => 100 * value), 1);
   row("Lab", values.lab, 1);
   if (values.slope) {
-    cell("slope", "name");
+    cell("slope", "b");
     const { angle, side } = values.slope;
-    cell(angle < 0.05 ? "flat" : `${angle.toFixed(1)}\u00b0 to the ${SIDES[Math.round(side / 45 + 8) % 8]}`, "wide");
+    cell(angle < 0.05 ? "flat" : `${angle.toFixed(1)}\u00b0 to the ${SIDES[Math.round(side / 45 + 8) % 8]}`, "span", "wide");
   }
-  for (const [family, numbers] of values.parameters) row(family, numbers, 3);
+  for (const [family, numbers] of values.parameters) row(family, numbers, 3, "detail");
 }

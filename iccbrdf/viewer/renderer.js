@@ -69,7 +69,7 @@ class Renderer {
         const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));
         throw new Error(`This device's graphics driver refuses the print: ${logs.join(" ")}`);
       }
-      const names = ["image", "table", "u", "place", "rows", "exposure", "surround", "taps", "measuring"];
+      const names = ["image", "table", "u", "place", "rows", "exposure", "soft", "surround", "taps", "measuring"];
       entry = { program, at: Object.fromEntries(names.map((name) => [name, gl.getUniformLocation(program, name)])) };
       this.programs.set(index, entry);
     }
@@ -83,7 +83,7 @@ class Renderer {
 
   // views: { program, env, from, to } of columns of the canvas; camera: column and row of the image under the
   // first pixel, and pixels of the image a pixel.
-  draw(views, camera, exposure, taps) {
+  draw(views, camera, exposure, soft, taps) {
     const { gl, canvas } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);
@@ -91,20 +91,38 @@ class Renderer {
     for (const view of views) {
       if (view.to <= view.from) continue;
       gl.scissor(view.from, 0, view.to - view.from, canvas.height);
-      this.picture(this.use(view.program, view.env), camera, canvas.height, exposure, taps);
+      this.picture(this.use(view.program, view.env), camera, canvas.height, exposure, soft, taps);
     }
     gl.disable(gl.SCISSOR_TEST);
   }
 
-  picture(at, camera, rows, exposure, taps) {
+  picture(at, camera, rows, exposure, soft, taps) {
     const { gl } = this;
     gl.uniform1i(at.measuring, 0);
     gl.uniform3f(at.place, camera.column, camera.row, camera.scale);
     gl.uniform1f(at.rows, rows);
     gl.uniform1f(at.exposure, exposure);
+    gl.uniform1i(at.soft, soft);
     gl.uniform3f(at.surround, SURROUND, SURROUND, SURROUND);
     gl.uniform1i(at.taps, taps);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  // Calls `then` as soon as everything that was asked for is drawn.
+  finished(then) {
+    const { gl } = this;
+    const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    const look = () => {
+      if (gl.isContextLost()) return;
+      if (gl.clientWaitSync(sync, 0, 0) === gl.TIMEOUT_EXPIRED) {
+        setTimeout(look, 1);
+        return;
+      }
+      gl.deleteSync(sync);
+      then();
+    };
+    look();
   }
 
   // XYZ under D50 of a rectangle of the image, before the display: 4 floats a pixel, the first row first.
@@ -114,6 +132,7 @@ class Renderer {
     this.offscreen(gl.RGBA32F, width, height);
     const at = this.use(program, env);
     gl.uniform1i(at.measuring, 1);
+    gl.uniform1i(at.taps, 1);
     gl.uniform3f(at.place, x, y, 1);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     const result = new Float32Array(4 * width * height);
@@ -122,10 +141,10 @@ class Renderer {
   }
 
   // Levels of the display in a rectangle of the image: 4 bytes a pixel, the last row first.
-  levels(program, env, exposure, x, y, width, height) {
+  levels(program, env, exposure, soft, x, y, width, height) {
     const { gl } = this;
     this.offscreen(gl.RGBA8, width, height);
-    this.picture(this.use(program, env), { column: x, row: y, scale: 1 }, height, exposure, 1);
+    this.picture(this.use(program, env), { column: x, row: y, scale: 1 }, height, exposure, soft, 1);
     const result = new Uint8Array(4 * width * height);
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, result);
     return result;

@@ -41,6 +41,11 @@ class Language:
     from_truth: str
 
 
+def name_of(node: Node) -> str:
+    """The constant that holds a node."""
+    return f"v{node.index}"
+
+
 def statements(language: Language, nodes: Iterable[Node], known: Mapping[Node, str]) -> list[str]:
     """A line of text for each of `nodes`, which come after what they read.
 
@@ -54,47 +59,48 @@ def statements(language: Language, nodes: Iterable[Node], known: Mapping[Node, s
     UnsupportedError
         The language has no pattern for a node.
     """
-    writer = _Writer(language, known)
-    lines = []
-    for node in nodes:
-        if node in known or node.op == "const":
-            continue
-        kind = language.truth if is_truth(node) else language.number
-        lines.append(language.declare.format(type=kind, name=name_of(node), value=writer.expression(node)))
-    return lines
-
-
-def numbers(language: Language, nodes: Iterable[Node], known: Mapping[Node, str]) -> list[str]:
-    """The texts of nodes as numbers, which `statements` has declared."""
-    writer = _Writer(language, known)
-    return [writer.number(node) for node in nodes]
-
-
-def name_of(node: Node) -> str:
-    """The constant that holds a node."""
-    return f"v{node.index}"
+    writer = Writer(language, known)
+    return [writer.declaration(node) for node in nodes if writer.declares(node)]
 
 
 @dataclass(frozen=True)
-class _Writer:
+class Writer:
+    """Texts of nodes in a language; `known` as of `statements`."""
+
     language: Language
     known: Mapping[Node, str]
 
+    def declares(self, node: Node) -> bool:
+        """Whether the node has a constant of its own."""
+        return node not in self.known and node.op != "const"
+
+    def declaration(self, node: Node, value: str | None = None) -> str:
+        """The line that holds a node; `value` in the place of its own expression."""
+        kind = self.language.truth if is_truth(node) else self.language.number
+        value = self.expression(node) if value is None else value
+        return self.language.declare.format(type=kind, name=name_of(node), value=value)
+
     def expression(self, node: Node) -> str:
+        """A node computed from its arguments' constants."""
         if node.op not in self.language.patterns:
             raise UnsupportedError(f"{node.op!r} cannot be written in {self.language.name}")
-        takes_truth = [node.op in LOGIC or (node.op == "select" and k == 0) for k in range(len(node.arguments))]
-        texts = [
-            self.condition(argument) if truth else self.number(argument)
-            for argument, truth in zip(node.arguments, takes_truth, strict=True)
+        return self.language.patterns[node.op].format(*self.arguments(node))
+
+    def arguments(self, node: Node) -> list[str]:
+        """The texts of a node's arguments, as conditions where it takes such."""
+        conditions = {"select": 1}.get(node.op, len(node.arguments) if node.op in LOGIC else 0)
+        return [
+            self.condition(argument) if k < conditions else self.number(argument)
+            for k, argument in enumerate(node.arguments)
         ]
-        return self.language.patterns[node.op].format(*texts)
 
     def number(self, node: Node) -> str:
+        """A node as a number."""
         text = self._text(node)
         return self.language.from_truth.format(text) if is_truth(node) else text
 
     def condition(self, node: Node) -> str:
+        """A node as a condition."""
         text = self._text(node)
         return text if is_truth(node) else f"({text} >= 0.5)"
 
