@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from cmm_examples import matrix, mid, mvis, program
 from test_brdf_interpolation import fogra39, random_primaries
+from test_icc_hostile import mutations
 from validate_examples import sound_mid, sound_mvis
 
 from iccbrdf.brdf.slopes import read_slopes
@@ -197,6 +198,12 @@ def test_unsound_programs_are_left_to_their_own_rule():
     profile = sound_mvis(M2B0=program("add out(0,3)", 2, 3))
     report = validate(profile.to_bytes(), checks=(check_numeric,))
     assert report.findings == ()
+
+
+def test_whatever_a_file_holds_is_examined_or_left_alone():
+    for path in (PROFILES[0], folder("profiles") / "ward_painting" / "mvis.icc"):
+        for data in mutations(path.read_bytes(), 25, 5):
+            validate(data, checks=(check_numeric,))
 
 
 # Declared ranges ----------------------------------------------------------------------------------------

@@ -91,7 +91,8 @@ class Shapes:
         parts = chain(norm, "add") if norm.op == "add" else chain(norm, "vmax")
         if norm.op == "add" and not all(map(self.not_negative, parts)):
             return False
-        return any(part.op == "sqrt" and self._holds_square(part.arguments[0], x) for part in parts)
+        roots = (part for part in parts if part.op == "sqrt" and not self.known(part).nan)
+        return any(self._holds_square(root.arguments[0], x) for root in roots)
 
     def _holds_square(self, total: Node, x: Node) -> bool:
         parts = chain(total, "add") if total.op == "add" else chain(total, "vmax")

@@ -121,7 +121,7 @@ class _Context:
     values: dict[Node, Interval] = field(default_factory=dict)
     """Of the nodes that the facts matter to."""
     unsafe: set[Node] = field(default_factory=set)
-    """In a trial, nodes that may fail."""
+    """In a trial, nodes that may fail here, or are given what has failed."""
     sides: dict[tuple[Node, Interval], _Context | None] = field(default_factory=dict)
 
 
@@ -251,12 +251,12 @@ class _Analyser:
             arguments.append((yield argument, context))
         value = self.apply(node, arguments, context)
         hazard = hazard_of(self.arithmetic, node, arguments, value)
-        if hazard is None:
-            return value
         if context.trial:
-            context.unsafe.add(node)
+            # What is given something that is not finite proves nothing.
+            if hazard is not None or not all(argument.finite or argument.empty for argument in arguments):
+                context.unsafe.add(node)
             return value
-        return (yield from self.examine(node, arguments, context, hazard))
+        return value if hazard is None else (yield from self.examine(node, arguments, context, hazard))
 
     def rounded(self, limits: Range) -> Interval:
         low, high = (self.arithmetic.round(limit) for limit in limits)
