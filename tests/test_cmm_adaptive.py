@@ -11,9 +11,8 @@ from iccbrdf.brdf.primaries import read_primaries
 from iccbrdf.build import build_pair
 from iccbrdf.build.effects import EFFECTS
 from iccbrdf.cmm import link
-from iccbrdf.cmm.adaptive import PIECE, Adaptive
+from iccbrdf.cmm.adaptive import PIECE, TILE, Adaptive
 from iccbrdf.cmm.effects import SUBSTITUTES
-from iccbrdf.cmm.execution import TILE
 from iccbrdf.errors import UsageError
 from iccbrdf.icc import NumberArray, read_profile
 
@@ -268,7 +267,8 @@ def test_llvm_gives_the_numbers_of_the_whole_chain():
         results, tally = auto.tallied(image)
         assert_close(results, full(image))
         kinds |= set(tally)
-    assert {"n constant", "full", "n constant, X, Y, Z constant"} <= kinds
+    # A flat print alone spares less than it takes to look.
+    assert kinds == {"full", "n constant, X, Y, Z constant"}
 
 
 # Effects that are left out -----------------------------------------------------------------------------

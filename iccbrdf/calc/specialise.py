@@ -60,18 +60,18 @@ def questions(graph: Graph, names: Sequence[str]) -> tuple[Question, ...]:
     whole = work(graph, ())
     chosen: list[Question] = []
     kinds = {frozenset[Question](): whole}
-    while len(chosen) < MAX_QUESTIONS:
-        options = []
+    while whole and len(chosen) < MAX_QUESTIONS:
         asked = [question.channels for question in chosen]
+        mean = statistics.mean(kinds.values())
+        options = []
         for question in (each for each in candidates if each.channels not in asked):
             more = {kind | {question}: work(graph, kind | {question}) for kind in kinds}
-            # Channels that are 0 are rarer than constant ones: to ask for that should be worth it.
-            penalty = _LEAST_GAIN * whole if question.zero else 0.0
-            options.append((statistics.mean(more.values()) + penalty, question, more))
-        if not options:
-            break
-        mean, best, more = min(options, key=lambda option: option[0])
-        if statistics.mean(kinds.values()) - mean < _LEAST_GAIN * whole:
+            options.append((mean - statistics.mean(more.values()), question, more))
+        # Channels that are 0 are rarer than constant ones.
+        gain, best, more = max(
+            options, key=lambda option: option[0] / (2 if option[1].zero else 1), default=(0.0, None, {})
+        )
+        if best is None or gain < _LEAST_GAIN * whole:
             break
         chosen.append(best)
         kinds |= more
@@ -146,7 +146,7 @@ def _held(graph: Graph, yes: Collection[Question]) -> tuple[set[int], set[Node]]
     for question in yes:
         constant.update(question.channels)
         if question.zero:
-            zero.update(chains[i][-1] for i in question.channels)
+            zero.update(chains[i][-1] for i in question.channels if i in chains)
     return constant, zero
 
 

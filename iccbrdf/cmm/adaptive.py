@@ -34,7 +34,6 @@ from iccbrdf.calc.specialise import (
 from iccbrdf.cmm.execution import (
     FULL,
     NOT_FINITE,
-    TILE,
     Array,
     Compiled,
     Execution,
@@ -45,6 +44,8 @@ from iccbrdf.cmm.execution import (
 )
 from iccbrdf.cmm.steps import Step
 
+TILE = 1 << 16
+"""Pixels that are looked at together: with fewer, looking takes longer than computing."""
 PIECE = 256
 """Pixels that are of one kind together: a part of an image's row."""
 _LEAST_PIECES = 8
@@ -53,7 +54,7 @@ _SAMPLES = 4
 """Pixels of a piece that are looked at first."""
 _SIDE = 64
 """Pixels that are compared with others at a time."""
-_LOOKING = {"llvm": 150, "numpy": 20}
+_LOOKING = {"llvm": 300, "numpy": 20}
 """What it takes by back end to look at a pixel, in units of its additions: a kind has to spare more."""
 _MAX_KERNELS = 3
 """Kernels of one kind, made for what more and more boxes have in common."""
@@ -201,7 +202,7 @@ class Adaptive:
         return answers
 
 
-_Key: TypeAlias = "tuple[int, tuple[float, ...]]"
+_Key: TypeAlias = "tuple[int, bytes]"
 """The number of a kind, and the values of the channels that are constant in it."""
 
 
@@ -214,7 +215,7 @@ class _Bound:
         self._finite, self._anything = chain.plain.runs(env)
         # What threads find at the same time is the same, so that they need not wait for each other.
         self._specials: dict[tuple[int, _Ends, _Ends], _Special | None] = {}
-        self._arguments: dict[tuple[int, tuple[float, ...]], list[np.generic]] = {}
+        self._arguments: dict[tuple[int, bytes], list[np.generic]] = {}
 
     def __call__(self, pixels: Array, out: Array) -> Tally:
         tally: Tally = Counter()
@@ -226,11 +227,7 @@ class _Bound:
     def _tile(self, tile: _Tile, tally: Tally) -> None:
         """Run pieces that look alike together, if they are, and the others in the whole chain."""
         least = min(_LEAST_PIECES, tile.pieces)
-        together: dict[_Key, list[int]] = {}
-        for piece, key in enumerate(self._keys(_Statistics.sampled(tile.pixels, tile.pieces))):
-            if key is not None:
-                together.setdefault(key, []).append(piece)
-        waiting = list(together.items())
+        waiting = list(self._together(_Statistics.sampled(tile.pixels, tile.pieces)).items())
         rest = set(range(tile.pieces))
         while waiting:
             key, pieces = waiting.pop()
@@ -238,7 +235,7 @@ class _Bound:
                 continue
             pixels = tile.gathered(pieces)
             found = _Statistics.of(pixels, 1)
-            if self._keys(found) == [key]:
+            if key in self._together(found):
                 special = self._special(key, found)
                 if special is not None:
                     arguments = self._values(special, key)
@@ -246,24 +243,27 @@ class _Bound:
                     tally[self._chain.kinds[key[0]].name] += len(pixels)
                     rest.difference_update(pieces)
             elif len(pieces) > 1:
-                keys = self._keys(_Statistics.of(pixels, len(pieces)))
-                waiting.append((key, [p for p, other in zip(pieces, keys, strict=True) if other == key]))
+                alike = self._together(_Statistics.of(pixels, len(pieces))).get(key, [])
+                waiting.append((key, [pieces[i] for i in alike]))
         if rest:
             pixels = tile.gathered(sorted(rest))
             finite = all_finite(pixels)
             tile.run(self._finite if finite else self._anything, sorted(rest), pixels)
             tally[FULL if finite else NOT_FINITE] += len(pixels)
 
-    def _keys(self, found: _Statistics) -> list[_Key | None]:
-        """By row; None for what runs in the whole chain."""
-        kinds = self._chain.kinds
-        answers = self._chain.answers(found).tolist()
-        if kinds.keys().isdisjoint(answers):
-            return [None] * len(answers)
-        return [
-            (number, tuple(row[i] for i in kinds[number].constant)) if number in kinds else None
-            for number, row in zip(answers, found.low.tolist(), strict=True)
-        ]
+    def _together(self, found: _Statistics) -> dict[_Key, list[int]]:
+        """The rows of each kind and with equal constants; those that run in the whole chain are left out."""
+        answers = self._chain.answers(found)
+        together: dict[_Key, list[int]] = {}
+        for number in self._chain.kinds.keys() & set(answers.tolist()):
+            rows = np.flatnonzero(answers == number)
+            constants = found.low[rows][:, self._chain.kinds[number].constant]
+            if (constants == constants[0]).all():
+                together[number, _bytes(constants[0])] = rows.tolist()
+                continue
+            for row, values in zip(rows.tolist(), constants, strict=True):
+                together.setdefault((number, _bytes(values)), []).append(row)
+        return together
 
     def _special(self, key: _Key, found: _Statistics) -> _Special | None:
         number, _ = key
@@ -282,7 +282,8 @@ class _Bound:
             if len(self._arguments) >= _MAX_KEPT:
                 self._arguments.clear()
             names = map(variable_of, self._chain.kinds[number].constant)
-            channels = dict(zip(names, constants, strict=True))
+            values = np.frombuffer(constants, special.plan.graph.dtype).tolist()
+            channels = dict(zip(names, values, strict=True))
             self._arguments[where] = uniform_values(special.plan, {**self._env, **channels})
         return self._arguments[where]
 
@@ -321,6 +322,11 @@ def _tiles(count: int) -> Iterator[tuple[slice, int]]:
         yield slice(start, end), (end - start) // PIECE
     if whole < count:
         yield slice(whole, count), 1
+
+
+def _bytes(values: Array) -> bytes:
+    """Numbers as a key; both zeros are one."""
+    return bytes((values + 0.0).tobytes())
 
 
 def _up(value: float) -> float:
