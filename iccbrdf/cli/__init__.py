@@ -22,6 +22,8 @@ COMMANDS = {
     "plan": "Say which effects an image calls for, by bounds.",
     "apply": "Map an image through profiles: XYZ TIFFs and PNG softproofs.",
     "proof": "Proof print jobs on a relief, under several lights.",
+    "view": "Make a page in which a proof is relit in a browser.",
+    "cost": "Show what accuracy costs in time on an image of yours.",
     "dump": "Show what a profile holds.",
     "validate": "Check whether profiles are sound.",
     "diff": "Show what differs between two profiles.",
