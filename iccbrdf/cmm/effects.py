@@ -34,6 +34,8 @@ class Choice:
     """Which effects run."""
 
     left_out: tuple[str, ...] = ()
+    named: tuple[str, ...] = ()
+    """Those of them that were named, and are not just others than those wanted."""
     adaptive: bool = False
     """Whether each tile runs only what it calls for."""
 
@@ -54,14 +56,14 @@ def choice(effects: str | Collection[str], without: Collection[str]) -> Choice:
     UsageError
         A name is unknown, or its effect is part of a program.
     """
-    left_out = [_known(name) for name in without]
+    left_out = tuple(dict.fromkeys(map(_known, without)))
     if isinstance(effects, str):
         if effects not in (FULL, AUTO):
             raise UsageError(f"effects {effects!r} is unknown: {nearest(effects, (FULL, AUTO))}")
-        return Choice(tuple(dict.fromkeys(left_out)), effects == AUTO)
+        return Choice(left_out, left_out, effects == AUTO)
     kept = [_known(name) for name in effects]
     others = [name for name, channels in SUBSTITUTES.items() if channels and name not in kept]
-    return Choice(tuple(dict.fromkeys([*others, *left_out])), True)
+    return Choice(tuple(dict.fromkeys([*others, *left_out])), left_out, True)
 
 
 def _known(name: str) -> str:
@@ -94,3 +96,20 @@ def substitution(names: Sequence[str], left_out: Collection[str]) -> Route | Non
         tuple(names.index(value) if isinstance(value, str) else None for value in chosen),
         tuple(0.0 if isinstance(value, str) else value for value in chosen),
     )
+
+
+def check(chosen: Choice, spaces: Sequence[Sequence[str]]) -> None:
+    """Whether what is to be left out can be, where profiles take the multiplex channels `spaces`.
+
+    Raises UsageError where none has a channel of an effect that was named; or where gloss is one channel,
+    ks, which in some models says how much is diffuse, too.
+    """
+    for effect in chosen.left_out:
+        channels = SUBSTITUTES[effect] or {}
+        if any(name in channels for names in spaces for name in names):
+            continue
+        if effect in chosen.named or (effect == "specular" and any("ks" in names for names in spaces)):
+            raise UsageError(
+                f"the effect {effect} cannot be left out here, as no profile takes a multiplex channel "
+                f"{', '.join(channels)}; build profiles without it: iccbrdf build --without {effect}"
+            )

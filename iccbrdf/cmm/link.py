@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from iccbrdf.cmm.arrange import arranged, without_decoding
-from iccbrdf.cmm.effects import Choice, choice, substitution
+from iccbrdf.cmm.effects import Choice, check, choice, substitution
 from iccbrdf.cmm.environment import checked_environment
 from iccbrdf.cmm.execution import BACKENDS
 from iccbrdf.cmm.join import join, media_white
@@ -135,6 +135,7 @@ def link(
     steps: list[Step] = []
     if channels is not None:
         steps, first = arranged(first, tuple(channels))
+    check(chosen, [stage.source.names for stage in (first, *others) if stage.source.kind == "mcs"])
     if first.source.kind == "pcs":
         steps += media_white(first, absolute, outward=False)
     steps += [*_without(chosen, first), first.step(interpolation)]
