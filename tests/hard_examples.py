@@ -46,11 +46,12 @@ class Promise(NamedTuple):
     error: float
 
 
-GRAZING = 0.01
-"""Cosine from which on the promises hold as they stand, half a degree above the horizon.
+GRAZING = 0.02
+"""Cosine from which on the promises hold as they stand, a degree above the horizon.
 
-The scalar product of two float32 vectors has an absolute error of about 1e-7, which is a relative one of
-1e-7 / cos: below this cosine what is promised grows as GRAZING / cosine.
+Directions of length 1 in float32 are uncertain by 1e-7.  That is a relative error of 1e-7 / cos of a cosine,
+and as much of the half vector where light and viewer both graze a surface and their sum is short: below this
+cosine what is promised grows as GRAZING / cosine.
 """
 
 PROMISES = (

@@ -326,22 +326,23 @@ def test_kd_is_not_lessened_by_what_facets_take():
 
 @pytest.mark.parametrize("model", MODELS)
 def test_the_icc_s_cmm_agrees_on_the_same_profiles(model, tmp_path):
-    """It takes light and viewer from the profile: every other kind of pair, 200,000 samples in all."""
+    """It takes light and viewer from the profile: every third kind of pair, 200,000 samples in all."""
     rng, names = np.random.default_rng(5), (*MODELS[model].channels, "n.x", "n.y", "n.z")
-    for light, view in islice(directions(rng), 0, 14, 2):
+    for light, view in islice(directions(rng), 0, 14, 3):
         chain = [mid(names), build_pair(primaries(model), variables=variables(light, view)).mvis]
-        printed = prints(model, light, view, 3300, rng)
+        printed, any_ = prints(model, light, view, 4600, rng), anything(len(names), 800, rng)
         spoilt = printed.copy()
         where = rng.random(spoilt.shape) < 0.02
         spoilt[where] = rng.choice([np.nan, np.inf, -np.inf], where.sum())
-        pixels = np.concatenate([printed, anything(len(names), 600, rng), spoilt])
-        theirs = reference(tmp_path, chain, pixels, pcs="XYZ ")
-        ours = iccbrdf.link(chain, backend="numpy")(pixels).astype(np.float64)
-        assert relative_error(ours[:3300], theirs[:3300]).max() < 1e-6
-        assert np.isfinite(theirs[:3900]).all()
+        pixels = np.concatenate([printed, any_, spoilt])
+        theirs = np.split(reference(tmp_path, chain, pixels, pcs="XYZ "), [4600, 5400])
+        ours = np.split(iccbrdf.link(chain, backend="numpy")(pixels).astype(np.float64), [4600, 5400])
+        assert relative_error(ours[0], theirs[0]).max() < 1e-6
+        assert np.isfinite(theirs[0]).all()
+        assert np.isfinite(theirs[1]).all()
         # At the horizon itself, theirs or ours may be the one that is lit.
         clear = np.abs(smallest_cosine(printed, light, view)) > 1e-6
-        np.testing.assert_array_equal(*(not_finite(XYZ[3900:][clear]) for XYZ in (ours, theirs)))
+        np.testing.assert_array_equal(*(not_finite(XYZ[2][clear]) for XYZ in (ours, theirs)))
 
 
 def not_finite(values):
@@ -524,12 +525,14 @@ def test_white_and_black_that_are_nearly_equal_give_numbers():
 # The long run -----------------------------------------------------------------------------------------------
 
 
-def test_the_tool_finds_the_same_and_writes_it(tmp_path):
+def test_the_tool_finds_the_same_and_writes_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(hard_cases, "COLOURS", 1000)
     errors = hard_cases.ErrorMap()
-    model = hard_cases.examine("ward", 20_000, 3, errors)
-    colour = hard_cases.examine_colours("smooth", "affine", 10_000, 3)
+    model = hard_cases.examine("ward", 10_000, 3, errors)
+    colour = hard_cases.examine_colours("smooth", "affine", 1000, 3)
     assert (model.not_finite, model.broken, colour.not_finite) == (0, 0, 0)
-    assert min(model.samples, colour.samples) >= 10_000
+    assert model.samples >= 10_000
+    assert colour.samples == 1000
     ours, printed = errors.by_m[0.001, 0.003]
     assert printed.quantile(0.99) > 100 * ours.quantile(0.99)
     assert ours.quantile(0.99) <= ours.largest < printed.largest
@@ -545,6 +548,6 @@ def test_what_is_broken_is_counted():
     held.add(errors)
     assert held.largest == np.inf
     assert held.quantile(0.75) == pytest.approx(1e-3, rel=0.03)
-    bound = promised(np.full(4, 0.05), np.array([1, 0.01, 1e-3, -0.1]))
+    bound = promised(np.full(4, 0.05), np.array([1, GRAZING, GRAZING / 10, -0.1]))
     np.testing.assert_allclose(bound, [1e-4, 1e-4, 1e-3, np.inf])
     assert promised(np.array([0.005]), np.array([1e-4])) == np.inf  # 5 would be promised, which is nothing

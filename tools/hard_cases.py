@@ -224,7 +224,7 @@ Every back end computes the same samples in float32 and in float64 (`tools/hard_
 |---|---|---|---|---|---|---|"""
 
 SINGLE_PRECISION = """
-Differences are relative, the largest; from the reference, those for m from .01 and cosines from .01.
+Differences are relative, the largest; from the reference, those for m from .01 and cosines from .02.
 
 ## float32
 
@@ -272,9 +272,10 @@ def report(models: Iterable[Findings], mids: Iterable[Findings], errors: ErrorMa
         yield row(*limits, ours.largest, at, printed.largest, printed_at, f"{printed_at / at:,.0f}")
     yield ""
     yield (
-        f"Below a cosine of {GRAZING:g}, half a degree above the horizon, few digits are left of the scalar\n"
-        "product of two float32 vectors: the promise grows as one over the cosine until it is .5, and ends.\n"
-        "The largest error there, times cosine / .01:\n"
+        "Directions of length 1 are uncertain by 1e-7 in float32.  Below a cosine of "
+        f"{GRAZING:g}, a degree above\nthe horizon, the promise therefore grows as one over the cosine "
+        "until it is .5, where it ends.  The\nlargest error there, times cosine / "
+        f"{GRAZING:g}: "
         + ", ".join(
             f"{errors.grazing[p]:.1e} for m from {p.least_m:g}" for p in PROMISES if p.least_cosine == GRAZING
         )
