@@ -45,10 +45,14 @@ class Pad {
     this.shape = shape;
     const defs = svg(element, "defs", {});
     this.shade = svg(defs, "radialGradient", { id: `${element.id}-shade`, cx: 0.5, cy: 0.5, r: 0.72 });
-    const stops = shape === "lamp" ? [[0, "#f4f4f4"], [0.5, "#868686"], [1, "#333"]] : [[0, "#5a5a5a"], [1, "#3a3a3a"]];
+    const stops = shape === "lamp"
+      ? [[0, "#f4f4f4"], [0.5, "#868686"], [1, "#333"]]
+      : [[0, "#5a5a5a"], [1, "#3a3a3a"]];
     for (const [offset, colour] of stops) svg(this.shade, "stop", { offset, "stop-color": colour });
     svg(element, "circle", { r: 100, fill: `url(#${element.id}-shade)` });
-    for (const zenith of [30, 60]) svg(element, "circle", { r: 100 * Math.sin((zenith * Math.PI) / 180), class: "ring" });
+    for (const zenith of [30, 60]) {
+      svg(element, "circle", { r: 100 * Math.sin((zenith * Math.PI) / 180), class: "ring" });
+    }
     svg(element, "circle", { r: 100, class: "rim" });
     this.knobs = [];
     this.held = null;
@@ -60,7 +64,9 @@ class Pad {
     element.addEventListener("pointermove", (event) => {
       if (this.held !== null) moved(this.held, this.at(event));
     });
-    for (const end of ["pointerup", "pointercancel"]) element.addEventListener(end, () => { this.held = null; });
+    for (const end of ["pointerup", "pointercancel"]) {
+      element.addEventListener(end, () => { this.held = null; });
+    }
   }
 
   at(event) {
@@ -108,14 +114,28 @@ class Pad {
   }
 }
 
+// Light and view as zenith and azimuth in degrees; lamp and eye are where they stand in the button's picture.
 const PRESETS = [
-  { name: "Left", title: "Raking light from the left (1)", light: [74, 180], view: [0, 0], lamp: [-15, -4], eye: [0, -20] },
-  { name: "Right", title: "Raking light from the right (2)", light: [74, 0], view: [0, 0], lamp: [15, -4], eye: [0, -20] },
-  { name: "Top", title: "Raking light from the top (3)", light: [74, 90], view: [0, 0], lamp: [6, -7], eye: [0, -20] },
-  { name: "0/45", title: "Light at 45 degrees, seen from above, as prints are measured (4)", light: [45, 180], view: [0, 0],
-    lamp: [-13, -13], eye: [0, -20] },
-  { name: "Mirror", title: "Seen where a flat print mirrors the light (5)", light: [40, 90], view: [40, 270],
-    lamp: [-12, -15], eye: [12, -15] },
+  {
+    name: "Left", title: "Raking light from the left (1)",
+    light: [74, 180], view: [0, 0], lamp: [-15, -4], eye: [0, -20],
+  },
+  {
+    name: "Right", title: "Raking light from the right (2)",
+    light: [74, 0], view: [0, 0], lamp: [15, -4], eye: [0, -20],
+  },
+  {
+    name: "Top", title: "Raking light from the top (3)",
+    light: [74, 90], view: [0, 0], lamp: [6, -7], eye: [0, -20],
+  },
+  {
+    name: "0/45", title: "Light at 45 degrees, seen from above, as prints are measured (4)",
+    light: [45, 180], view: [0, 0], lamp: [-13, -13], eye: [0, -20],
+  },
+  {
+    name: "Mirror", title: "Seen where a flat print mirrors the light (5)",
+    light: [40, 90], view: [40, 270], lamp: [-12, -15], eye: [12, -15],
+  },
 ];
 
 // From the side: a print, the lamp and its beam, and the way to the eye.
@@ -123,6 +143,8 @@ function presetPicture(button, preset) {
   const picture = svg(button, "svg", { viewBox: "-17 -22 34 26", "aria-hidden": "true" });
   svg(picture, "line", { class: "print", x1: -16, x2: 16, y1: 2, y2: 2 });
   svg(picture, "line", { class: "beam", x1: preset.lamp[0], y1: preset.lamp[1], x2: 0, y2: 0 });
-  svg(picture, "line", { class: "beam", x1: 0, y1: 0, x2: preset.eye[0], y2: preset.eye[1], "stroke-dasharray": "2 2.4" });
+  svg(picture, "line", {
+    class: "beam", x1: 0, y1: 0, x2: preset.eye[0], y2: preset.eye[1], "stroke-dasharray": "2 2.4",
+  });
   svg(picture, "circle", { class: "lamp", cx: preset.lamp[0], cy: preset.lamp[1], r: 3.6 });
 }

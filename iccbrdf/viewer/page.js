@@ -24,16 +24,21 @@ const initial = () => ({
 });
 const mirrored = ([x, y, z]) => (Math.hypot(x, y) < 0.05 ? fromAngles(60, 0) : [-x, -y, z]);
 
+const ratioOf = () => window.devicePixelRatio || 1;
+
 let state = initial();
 let camera = { x: page.width / 2, y: page.height / 2, scale: 1, fitted: true };
 let renderer = null, layers = [], pointer = null;
-let asked = false, inFlight = false, refining = 0, changedAt = 0, frameTime = null, coarse = 1;
+let asked = false, inFlight = false, refined = false, refining = 0;
+let changedAt = 0, frameTime = null, coarse = 1;
 
-// What is drawn ------------------------------------------------------------------------------------------------
+// What is drawn ------------------------------------------------------------------------------------------
 
 function envOf(k) {
   const env = { ...page.env };
-  const set = (names, vector) => names.forEach((name, i) => { if (page.variables.includes(name)) env[name] = vector[i]; });
+  const set = (names, vector) => names.forEach((name, i) => {
+    if (page.variables.includes(name)) env[name] = vector[i];
+  });
   set(["litX", "litY", "litZ"], state.lights[k]);
   set(["vueX", "vueY", "vueZ"], state.view);
   if (page.intensity !== null) {
@@ -48,7 +53,8 @@ const programOf = (without) => page.of[[...without].sort().join(",")];
 // One view, or two side by side: { program, env, from, to } with columns of the canvas.
 function views() {
   const split = Math.round(state.divider * canvas.width);
-  const left = { program: programOf(state.without), env: envOf(state.compare === "lights" ? 0 : state.active) };
+  const shown = state.compare === "lights" ? 0 : state.active;
+  const left = { program: programOf(state.without), env: envOf(shown) };
   if (state.compare === "none") return [{ ...left, from: 0, to: canvas.width }];
   const right = state.compare === "lights"
     ? { program: left.program, env: envOf(1) }
@@ -58,6 +64,7 @@ function views() {
 
 function change() {
   changedAt = performance.now();
+  refined = false;
   ask();
 }
 
@@ -73,14 +80,16 @@ function frame() {
   asked = false;
   if (!renderer || renderer.gl.isContextLost()) return;
   const still = performance.now() - changedAt > STILL_AFTER;
-  draw(still);
   clearTimeout(refining);
   if (!still) refining = setTimeout(ask, STILL_AFTER + 20);
   inFlight = true;
-  const begun = performance.now();
+  const begun = performance.now(), compiled = renderer.programs.size;
+  draw(still);
   renderer.finished(() => {
     inFlight = false;
-    if (!still) measured(performance.now() - begun);
+    if (still && changedAt < begun) refined = true;
+    // The first frame of a program is the compiler's time.
+    if (!still && renderer.programs.size === compiled) measured(performance.now() - begun);
     if (asked) requestAnimationFrame(frame);
   });
 }
@@ -95,21 +104,23 @@ function measured(time) {
   showCost();
 }
 
-function draw(still) {
-  const ratio = window.devicePixelRatio || 1;
-  const shrink = still ? 1 : coarse;
-  const width = Math.max(1, Math.round((stage.clientWidth * ratio) / shrink));
-  const height = Math.max(1, Math.round((stage.clientHeight * ratio) / shrink));
+// Sizes the canvas, `shrink` times coarser than the window; gives the camera as the renderer has it.
+function framed(shrink) {
+  const width = Math.max(1, Math.round((stage.clientWidth * ratioOf()) / shrink));
+  const height = Math.max(1, Math.round((stage.clientHeight * ratioOf()) / shrink));
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   const scale = camera.scale * shrink;
-  const corner = { column: camera.x - (width / 2) * scale, row: camera.y - (height / 2) * scale, scale };
-  const finest = scale > 1 ? Math.min(4, Math.ceil(scale)) : Number.isInteger(1 / scale) ? 1 : 2;
-  renderer.draw(views(), corner, 2 ** state.exposure, state.soft, still ? finest : Math.min(finest, 2));
+  return { column: camera.x - (width / 2) * scale, row: camera.y - (height / 2) * scale, scale };
 }
 
-// Zoom and pan -------------------------------------------------------------------------------------------------
+function draw(still) {
+  const place = framed(still ? 1 : coarse);
+  const { scale } = place;
+  const finest = scale > 1 ? Math.min(4, Math.ceil(scale)) : Number.isInteger(1 / scale) ? 1 : 2;
+  renderer.draw(views(), place, 2 ** state.exposure, state.soft, still ? finest : Math.min(finest, 2));
+}
 
-const ratioOf = () => window.devicePixelRatio || 1;
+// Zoom and pan -------------------------------------------------------------------------------------------
 
 function fit() {
   const [width, height] = [stage.clientWidth * ratioOf(), stage.clientHeight * ratioOf()];
@@ -168,12 +179,14 @@ function listenToPicture() {
     const before = touches.get(event.pointerId);
     if (!before) return;
     const step = ratioOf() * camera.scale;
-    if (touches.size === 1) pan((event.clientX - before.clientX) * step, (event.clientY - before.clientY) * step);
+    const [dx, dy] = [(event.clientX - before.clientX) * step, (event.clientY - before.clientY) * step];
+    if (touches.size === 1) pan(dx, dy);
     if (touches.size === 2) {
       const other = [...touches.values()].find((touch) => touch.pointerId !== event.pointerId);
       const apart = (touch) => Math.hypot(touch.clientX - other.clientX, touch.clientY - other.clientY) || 1;
-      pan(((event.clientX - before.clientX) * step) / 2, ((event.clientY - before.clientY) * step) / 2);
-      zoom(apart(event) / apart(before), (event.clientX + other.clientX) / 2, (event.clientY + other.clientY) / 2);
+      const middle = [(event.clientX + other.clientX) / 2, (event.clientY + other.clientY) / 2];
+      pan(dx / 2, dy / 2);
+      zoom(apart(event) / apart(before), ...middle);
     }
     touches.set(event.pointerId, event);
   });
@@ -202,7 +215,7 @@ function listenToPicture() {
   new ResizeObserver(() => (camera.fitted ? fit() : change())).observe(stage);
 }
 
-// Controls -----------------------------------------------------------------------------------------------------
+// Controls -----------------------------------------------------------------------------------------------
 
 let lightPad = null, viewPad = null;
 
@@ -352,7 +365,8 @@ function build() {
 }
 
 function update() {
-  lightPad.show(state.compare === "lights" ? state.lights : [state.lights[state.active]], state.compare === "lights" ? state.active : 0);
+  if (state.compare === "lights") lightPad.show(state.lights, state.active);
+  else lightPad.show([state.lights[state.active]], 0);
   viewPad.show([state.view], 0);
   byId("light-value").textContent = inWords(state.lights[state.active]);
   byId("view-value").textContent = inWords(state.view);
@@ -387,7 +401,8 @@ function showEffects() {
     const [more, less] = [operations(others), operations(new Set([...others, effect]))];
     element.setAttribute("aria-checked", !state.without.has(effect));
     element.disabled = more === less;
-    element.querySelector("small").textContent = more === less ? "" : `${Math.round((100 * (more - less)) / more)} %`;
+    const share = `${Math.round((100 * (more - less)) / more)} %`;
+    element.querySelector("small").textContent = more === less ? "" : share;
     element.title = `${more} operations a pixel with it, ${less} without`;
   }
 }
@@ -405,7 +420,7 @@ function showPixel() {
   showReadout(byId("readout"), pixelValues(page, layers, view.program, view.env, column, row));
 }
 
-// Start --------------------------------------------------------------------------------------------------------
+// Start --------------------------------------------------------------------------------------------------
 
 function say(text) {
   byId("message").textContent = text;
@@ -443,13 +458,26 @@ globalThis.proof = {
   pixel: (program, env, column, row) => pixelValues(page, layers, program, env, column, row),
   // Resolves when everything that was changed is on the canvas, at its best.
   settled: async () => {
-    const over = () => !asked && !inFlight && performance.now() - changedAt > STILL_AFTER + 60;
-    while (!over()) await new Promise((resolve) => setTimeout(resolve, 20));
+    while (!refined) await new Promise((resolve) => setTimeout(resolve, 20));
   },
-  // Milliseconds of a frame of the whole window.
-  time: () => new Promise((resolve) => {
-    const begun = performance.now();
-    draw(false);
-    renderer.finished(() => resolve(performance.now() - begun));
-  }),
+  // The print fills the window.
+  fill: () => {
+    const scale = Math.min(page.width / canvas.width, page.height / canvas.height);
+    camera = { ...camera, scale, fitted: false };
+    change();
+  },
+  // Milliseconds of frames, one place a pixel, between which the light moves.
+  times: async (count) => {
+    await globalThis.proof.settled();
+    const found = [];
+    for (let k = 0; k < count; k++) {
+      state.lights[state.active] = fromAngles(50, (360 * k) / count);
+      const begun = performance.now();
+      const place = framed(1);
+      renderer.draw(views(), place, 1, false, 1);
+      await new Promise((resolve) => renderer.finished(resolve));
+      found.push(performance.now() - begun);
+    }
+    return found;
+  },
 };

@@ -53,7 +53,8 @@ function showReadout(element, values) {
   if (values.slope) {
     cell("slope", "b");
     const { angle, side } = values.slope;
-    cell(angle < 0.05 ? "flat" : `${angle.toFixed(1)}\u00b0 to the ${SIDES[Math.round(side / 45 + 8) % 8]}`, "span", "wide");
+    const downhill = `${angle.toFixed(1)}\u00b0 to the ${SIDES[Math.round(side / 45 + 8) % 8]}`;
+    cell(angle < 0.05 ? "flat" : downhill, "span", "wide");
   }
   for (const [family, numbers] of values.parameters) row(family, numbers, 3, "detail");
 }

@@ -5,13 +5,20 @@ void main() {
   gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
 }`;
 
+const UNIFORMS = [
+  "image", "table", "u", "place", "rows", "exposure", "soft", "surround", "taps", "measuring",
+];
+
 class Renderer {
   constructor(canvas, page, layers) {
     this.canvas = canvas;
     this.page = page;
     this.layers = layers;
-    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, powerPreference: "high-performance" });
-    if (!gl) throw new Error("This print needs WebGL 2, which this browser does not have or has switched off.");
+    const wanted = { alpha: false, antialias: false, powerPreference: "high-performance" };
+    const gl = canvas.getContext("webgl2", wanted);
+    if (!gl) {
+      throw new Error("This print needs WebGL 2, which this browser does not have or has switched off.");
+    }
     this.gl = gl;
     this.start();
   }
@@ -20,8 +27,9 @@ class Renderer {
   start() {
     const { gl, page } = this;
     const limit = gl.getParameter(gl.MAX_TEXTURE_SIZE);
-    if (Math.max(page.width, page.height) > limit) {
-      throw new Error(`This device shows prints of up to ${limit} pixels across; this one has ${Math.max(page.width, page.height)}.`);
+    const longest = Math.max(page.width, page.height);
+    if (longest > limit) {
+      throw new Error(`This device shows prints of up to ${limit} pixels across; this one has ${longest}.`);
     }
     if ("drawingBufferColorSpace" in gl) gl.drawingBufferColorSpace = page.display.canvas;
     this.programs = new Map();
@@ -58,7 +66,8 @@ class Renderer {
     let entry = this.programs.get(index);
     if (!entry) {
       const program = gl.createProgram();
-      for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, this.page.programs[index].shader]]) {
+      const fragment = this.page.programs[index].shader;
+      for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, fragment]]) {
         const shader = gl.createShader(kind);
         gl.shaderSource(shader, text);
         gl.compileShader(shader);
@@ -69,8 +78,8 @@ class Renderer {
         const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));
         throw new Error(`This device's graphics driver refuses the print: ${logs.join(" ")}`);
       }
-      const names = ["image", "table", "u", "place", "rows", "exposure", "soft", "surround", "taps", "measuring"];
-      entry = { program, at: Object.fromEntries(names.map((name) => [name, gl.getUniformLocation(program, name)])) };
+      const at = Object.fromEntries(UNIFORMS.map((name) => [name, gl.getUniformLocation(program, name)]));
+      entry = { program, at };
       this.programs.set(index, entry);
     }
     gl.useProgram(entry.program);

@@ -7,7 +7,7 @@ precision highp sampler3D;
 uniform highp usampler2DArray image;
 uniform highp sampler3D table;
 uniform highp float u[ARGUMENTS];
-uniform highp vec3 place;      // column and row of the image under the canvas's first pixel, and pixels a pixel
+uniform highp vec3 place;      // column and row of the image under the first pixel, and pixels a pixel
 uniform highp float rows;      // of the canvas
 uniform highp float exposure;
 uniform highp vec3 surround;
