@@ -61,6 +61,23 @@ def landscape(primaries: Primaries) -> Scene:
     )
 
 
+def four_scenes(primaries: Primaries) -> dict[str, Image]:
+    """The print as BRDF images: flat and in relief, matte and glossy, by name (`flat matte`, ...).
+
+    Flat ones have their normals along z, matte ones a ks of 0.
+    """
+    brdf = landscape(primaries).brdf
+    is_normal = np.isin(brdf.names, NORMAL)
+    is_gloss = np.array([name.partition(".")[0] == "ks" for name in brdf.names])
+    flat = np.where(is_normal, np.where(np.array(brdf.names) == "n.z", 1.0, 0.5), brdf.device)
+    scenes = {"flat": flat.astype(np.float32), "relief": brdf.device}
+    return {
+        f"{shape} {surface}": Image(np.where(is_gloss, factor * device, device), brdf.names)
+        for shape, device in scenes.items()
+        for surface, factor in (("matte", np.float32(0)), ("glossy", np.float32(1)))
+    }
+
+
 def _heights() -> tuple[npt.NDArray[np.float64], float]:
     """Heights on the print's pixel grid, and the grid's pitch, both in mm of the unexaggerated print."""
     from matplotlib.cbook import get_sample_data

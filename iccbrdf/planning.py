@@ -8,6 +8,8 @@ from __future__ import annotations
 import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -52,36 +54,34 @@ class Built:
 class ScenePlan:
     """What an image calls for under some lights and a view.
 
+    planning: the image, and what its profiles are made of.
     findings, decision: of each effect, and of all that are left out together.
-    is_colour: whether the image holds XYZ, for a colour MID, rather than parameters.
-    names: its channels.
-    full, reduced: the profiles with all effects, and with those alone that the scene calls for.
     seconds: spent on `reading` the image, on `decoding` it to parameters, and on `bounding`.
     """
 
-    recipe: Recipe
+    planning: Planning
     findings: tuple[Finding, ...]
     decision: Decision
     tolerance: float
-    is_colour: bool
-    names: tuple[str, ...]
-    full: Built
-    reduced: Built
     seconds: Mapping[str, float]
 
+    @property
+    def full(self) -> Built:
+        """The profiles with all effects."""
+        return self.planning.built()
 
-def plan_image(
-    source: ImageSource,
-    recipe: Recipe,
-    lights: Directions,
-    view: Directions,
-    *,
-    tolerance: float = 0.0,
-    env: Mapping[str, float] | None = None,
-    names: Sequence[str] | None = None,
-) -> ScenePlan:
-    """
-    Plan which effects an image calls for.
+    @cached_property
+    def reduced(self) -> Built:
+        """The profiles with those effects alone that the scene calls for, which say so."""
+        without, exact = self.decision.without, self.decision.exact
+        if not without:
+            return self.full
+        loss = "no loss" if exact else f"CIEDE2000 at most {self.decision.bound:.3g}"
+        return self.planning.built(without, f", reduced for a scene: without {', '.join(without)} ({loss})")
+
+
+class Planning:
+    """An image and what its profiles are made of, to be planned under any lights.
 
     Parameters
     ----------
@@ -89,12 +89,6 @@ def plan_image(
         A BRDF image (the parameters of the recipe's model, perhaps normals) or XYZ and normals.
     recipe
         What the profiles are made of.
-    lights, view
-        Directions: lights are points or ranges, of views there is one.
-    tolerance
-        CIEDE2000 that may be lost; 0: float32 rounding alone.
-    env
-        Further run-time variables (`litI`, `ambI`).
     names
         The image's channels, where it does not say them itself.
 
@@ -103,43 +97,99 @@ def plan_image(
     UsageError
         The channels fit neither kind of image.
     """
-    pair = recipe.pair()
-    names = _names(source, pair.compiled.inputs, names)
-    is_colour = set("XYZ") <= set(names)
-    places = list(source.places())
-    seconds = {"reading": 0.0}
-    first = _timed_read(source, places[0], seconds)
-    reference = _mean_XYZ(first, names, source.samples) if is_colour else None
 
-    def made(without: Collection[str], note: str = "") -> Built:
-        # An angle for a term that is left out would be a contradiction.
-        less = replace(recipe, fresnel_angle=None) if "fresnel" in without else recipe
-        if not is_colour:
-            return Built(less.pair(without, device=pair.compiled.inputs, note=note), None)
-        colour = less.colour_mid(without, reference=reference, device=DEVICE, note=note)
-        return Built(less.pair(without, note=note) if without else pair, colour)
+    def __init__(self, source: ImageSource, recipe: Recipe, names: Sequence[str] | None = None) -> None:
+        self.source, self.recipe = source, recipe
+        self._built: dict[tuple[frozenset[str], str], Built] = {}
+        self._pair = recipe.pair()
+        self.names = _names(source, self._pair.compiled.inputs, names)
+        self.is_colour = set("XYZ") <= set(self.names)
+        """Whether the image holds XYZ, for a colour MID, rather than parameters."""
+        self._reference: tuple[float, ...] | None = None
 
-    full = made(())
-    decoders = {
-        way: _decoder(made(way) if way else full, names, source.samples) for way in _ways(recipe, is_colour)
-    }
-    defaults = dict(zip(pair.compiled.inputs, pair.compiled.defaults, strict=True))
-    planner = Planner(recipe.reflection(env or {}), decoders, defaults, lights, view, tolerance)
-    for place in places:
-        data = first if place is places[0] else _timed_read(source, place, seconds)
-        planner.look(place.y0, place.x0, data)
-    decision = planner.decide(lambda without: made(without).executed)
-    return ScenePlan(
-        recipe,
-        planner.findings(decision),
-        decision,
-        tolerance,
-        is_colour,
-        names,
-        full,
-        made(decision.without, _note(decision)) if decision.without else full,
-        {**seconds, **planner.seconds},
-    )
+    def built(self, without: Collection[str] = (), note: str = "") -> Built:
+        """The profiles less some effects, with a note in their descriptions."""
+        key = frozenset(without), note
+        if key not in self._built:
+            # An angle for a term that is left out would be a contradiction.
+            recipe = replace(self.recipe, fresnel_angle=None) if "fresnel" in without else self.recipe
+            colour, device = None, None
+            if self.is_colour:
+                colour = recipe.colour_mid(without, reference=self._reference, device=DEVICE, note=note)
+            else:
+                device = self._pair.compiled.inputs
+            self._built[key] = Built(recipe.pair(without, device=device, note=note), colour)
+        return self._built[key]
+
+    def plan(
+        self,
+        lights: Directions,
+        view: Directions,
+        *,
+        tolerance: float = 0.0,
+        env: Mapping[str, float] | None = None,
+    ) -> ScenePlan:
+        """
+        Plan which effects the image calls for, reading it once.
+
+        Parameters
+        ----------
+        lights, view
+            Directions: lights are points or ranges, of views there is one.
+        tolerance
+            CIEDE2000 that may be lost; 0: float32 rounding alone.
+        env
+            Further run-time variables (`litI`, `ambI`).
+        """
+        seconds = {"reading": 0.0}
+        first = self._read(self._places[0], seconds)
+        if self.is_colour and self._reference is None:
+            self._reference = _mean_XYZ(first, self.names, self.source.samples)
+        compiled = self._pair.compiled
+        planner = Planner(
+            self.recipe.reflection(env or {}),
+            self._decoders,
+            dict(zip(compiled.inputs, compiled.defaults, strict=True)),
+            lights,
+            view,
+            tolerance,
+        )
+        for place in self._places:
+            data = first if place is self._places[0] else self._read(place, seconds)
+            planner.look(place.y0, place.x0, data)
+        decision = planner.decide(lambda without: self.built(without).executed)
+        return ScenePlan(
+            self, planner.findings(decision), decision, tolerance, {**seconds, **planner.seconds}
+        )
+
+    @cached_property
+    def _places(self) -> list[Place]:
+        return list(self.source.places())
+
+    @cached_property
+    def _decoders(self) -> dict[Way, Decoder]:
+        """By what they leave out of slope and interpolation, as far as there is either."""
+        ways = [FULL]
+        if self.is_colour:
+            ways.append(Way({"interpolation"}))
+            if self.recipe.slopes is not None:
+                ways += [way | {"slope"} for way in ways]
+        decoders = {}
+        for way in ways:
+            settings: dict[str, Any] = {
+                "channels": self.names,
+                "samples": self.source.samples,
+                "dtype": np.float64,
+            }
+            transform = link(self.built(way).chain[:1], **settings)
+            decoders[way] = Decoder(transform.channels_out, transform)
+        return decoders
+
+    def _read(self, place: Place, seconds: dict[str, float]) -> Samples:
+        begun = time.perf_counter()
+        data = self.source.read(place).data
+        seconds["reading"] += time.perf_counter() - begun
+        return data
 
 
 @dataclass(frozen=True)
@@ -157,12 +207,13 @@ class Check:
     scenes: int
 
 
-def check_image(source: ImageSource, plan: ScenePlan, environments: Sequence[Mapping[str, float]]) -> Check:
+def check_image(plan: ScenePlan, environments: Sequence[Mapping[str, float]]) -> Check:
     """Run the image through the full and the reduced profiles, under each set of run-time variables."""
+    source, names = plan.planning.source, plan.planning.names
     transforms = [
-        link(built.chain, channels=plan.names, samples=source.samples) for built in (plan.full, plan.reduced)
+        link(built.chain, channels=names, samples=source.samples) for built in (plan.full, plan.reduced)
     ]
-    white = plan.recipe.primaries.white
+    white = plan.planning.recipe.primaries.white
     worst = Check(0.0, (0, 0), 0.0, len(environments))
     for place in source.places():
         data = source.read(place).data
@@ -208,32 +259,6 @@ def _names(source: ImageSource, own: Sequence[str], declared: Sequence[str] | No
         f"the image has {source.channels} channels without names, expected {len(own)} ({', '.join(own)}) or "
         f"{len(DEVICE)} ({', '.join(DEVICE)}); name them with --channels"
     )
-
-
-def _ways(recipe: Recipe, is_colour: bool) -> list[Way]:
-    """Which of slope and interpolation there are to leave out."""
-    if not is_colour:
-        return [FULL]
-    ways = [FULL, Way({"interpolation"})]
-    return ways if recipe.slopes is None else [*ways, *(way | {"slope"} for way in ways)]
-
-
-def _note(decision: Decision) -> str:
-    loss = "no loss" if decision.exact else f"CIEDE2000 at most {decision.bound:.3g}"
-    return f", reduced for a scene: without {', '.join(decision.without)} ({loss})"
-
-
-def _decoder(built: Built, names: tuple[str, ...], samples: str) -> Decoder:
-    mid = built.colour.mid if built.colour else built.pair.mid
-    transform = link([mid], channels=names, samples=samples, dtype=np.float64)
-    return Decoder(transform.channels_out, transform)
-
-
-def _timed_read(source: ImageSource, place: Place, seconds: dict[str, float]) -> Samples:
-    begun = time.perf_counter()
-    data = source.read(place).data
-    seconds["reading"] += time.perf_counter() - begun
-    return data
 
 
 def _mean_XYZ(data: Samples, names: Sequence[str], samples: str) -> tuple[float, ...]:

@@ -43,6 +43,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -308,14 +309,22 @@ class Terms:
 class Change:
     """What leaving an effect out does at most, element by element."""
 
-    dE: Array
-    """Bound of the weighted distance in L*a*b* (see the module), and so of CIEDE2000."""
     exact: NDArray[np.bool_]
     """Whether the result is the same but for float32 rounding."""
+    bound: Callable[[], Array]
+    """Computes the bound, where the result is not the same."""
+
+    @cached_property
+    def dE(self) -> Array:
+        """Bound of the weighted distance in L*a*b* (see the module), and so of CIEDE2000; 0 where exact."""
+        if self.exact.all():
+            return np.zeros(self.exact.shape)
+        dE = self.bound()
+        return np.where(self.exact, 0.0, np.where(np.isnan(dE), np.inf, dE))
 
     def broadcast(self, shape: tuple[int, ...]) -> Change:
         """The same for all elements of an array of that shape."""
-        return Change(np.broadcast_to(self.dE, shape), np.broadcast_to(self.exact, shape))
+        return Change(np.broadcast_to(self.exact, shape), lambda: np.broadcast_to(self.bound(), shape))
 
 
 def changes_of_effects(terms: Terms, wanted: Collection[str]) -> dict[str, Change]:
@@ -350,7 +359,7 @@ def changes_of_effects(terms: Terms, wanted: Collection[str]) -> dict[str, Chang
         change = [-d for d in product(ks, either, (ONE - F) * V.join(terms.V_unshadowed))]
         found["fresnel"] = step(change, product(ks, either, terms.V_unshadowed))
     if "below-horizon" in wanted:
-        found["below-horizon"] = Change(np.where(under.lit, 0.0, np.inf), under.lit)
+        found["below-horizon"] = Change(under.lit, lambda: np.array(np.inf))
     if "highlight-range" in wanted:
         found["highlight-range"] = _above_white(terms, gloss)
     return found
@@ -414,13 +423,17 @@ def _where_seen(
     pairs = list(zip(change, low, strict=True))
     # What is not a number compares as false, and so counts as the worst.
     exact = np.logical_and.reduce([d.magnitude <= EXACT * np.abs(x) + VANISHING for d, x in pairs])
-    f = [
-        _lightness_change(d, x, y, white)
-        for (d, x), y, white in zip(pairs, high, reflection.white, strict=True)
-    ]
-    dL, da, db = f[1].magnitude * 116, (f[0] - f[1]).magnitude * 500, (f[1] - f[2]).magnitude * 200
-    dE = np.sqrt(dL * dL + CHROMATIC_WEIGHT * (da * da + db * db))
-    return Change(np.where(exact, 0.0, np.where(np.isnan(dE), np.inf, dE)), exact)
+
+    def bound() -> Array:
+        f = [
+            _lightness_change(d, x, y, white)
+            for (d, x), y, white in zip(pairs, high, reflection.white, strict=True)
+        ]
+        dL, da, db = f[1].magnitude * 116, (f[0] - f[1]).magnitude * 500, (f[1] - f[2]).magnitude * 200
+        dE: Array = np.sqrt(dL * dL + CHROMATIC_WEIGHT * (da * da + db * db))
+        return dE
+
+    return Change(exact, bound)
 
 
 def _lightness_change(change: Span, low: Array, high: Array, white: float) -> Span:

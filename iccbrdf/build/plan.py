@@ -41,6 +41,9 @@ LEVELS = (64, 8, 2, 1)
 CHUNK = 1 << 13
 """Cells that are judged at a time: their intermediate results stay in the processor's cache."""
 
+FEWEST = 16
+"""Cells of a block that are worth judging; blocks with fewer tiles start with smaller ones."""
+
 REFINE = 0.25
 """The part of the tolerance from which on a cell is looked at more closely, under few lights."""
 
@@ -194,9 +197,10 @@ class Planner:
         decoded = time.perf_counter()
         block = _Block(y0, x0, data.shape[:2], pixels)
         self._spent = 0
-        lights, cells = np.divmod(np.arange(len(self._lights) * block.count(0)), block.count(0))
+        level = next(level for level, side in enumerate(LEVELS) if side == 1 or block.count(level) >= FEWEST)
+        lights, cells = np.divmod(np.arange(len(self._lights) * block.count(level)), block.count(level))
         with np.errstate(all="ignore"):
-            self._search(block, 0, lights, cells, open_now)
+            self._search(block, level, lights, cells, open_now)
         self.seconds["decoding"] += decoded - begun
         self.seconds["bounding"] += time.perf_counter() - decoded
 
@@ -224,7 +228,7 @@ class Planner:
             failed = np.zeros(len(cells[here]), np.bool_)
             unsure: list[tuple[_Question, Change]] = []
             for question, change in self._changes(block, level, lights[here], cells[here], questions):
-                last = level == question.finest
+                last = level >= question.finest
                 worse = self._worse(change, self._tolerance * (1 if last else self._refine))
                 question.note(change, ~worse)
                 if last and worse.any():

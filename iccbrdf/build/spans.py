@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from iccbrdf.brdf.geometry import Array, direction
+from iccbrdf.errors import UsageError
 
 
 @dataclass(frozen=True)
@@ -125,9 +126,12 @@ class Directions:
 
     @classmethod
     def single(cls, vectors: ArrayLike, texts: Sequence[str]) -> Directions:
-        """Directions by their vectors (n, 3), of any length but 0."""
+        """Directions by their vectors (n, 3); UsageError where one has no length."""
         vectors = np.asarray(vectors, np.float64)
-        unit = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+        lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+        if not lengths.all():
+            raise UsageError("light or view: found a vector of length 0, which has no direction")
+        unit = vectors / lengths
         x, y, z = (Span.of(component) for component in unit.T)
         return cls((x, y, z), unit, tuple(texts))
 

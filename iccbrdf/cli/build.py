@@ -13,6 +13,7 @@ from iccbrdf.brdf.slopes import read_slopes
 from iccbrdf.build import GRIDS, INTERPOLATIONS, SLOPE_METHODS, ColourMid, build_tables
 from iccbrdf.build.recipe import Recipe
 from iccbrdf.cli.options import (
+    FiniteRange,
     emit,
     environment,
     force_option,
@@ -39,6 +40,8 @@ Examples:
   iccbrdf build primaries.json -o out --table 33
   Only what an image calls for, under the light that it is for:
   iccbrdf build primaries.json -o out --for relief.tif --light 50,180 --tolerance 0.5
+  The quickest profiles within a CIEDE2000 of the exact proof of an image:
+  iccbrdf build primaries.json -o out --for relief.tif --light 50,180 --budget 0.5
   Without the Fresnel term, and with other defaults for light and view:
   iccbrdf build primaries.json -o out --without fresnel --light 60,90 --view 10,270
 """
@@ -66,6 +69,9 @@ Examples:
 @click.option("--for", "image", type=click.Path(path_type=Path),
               help="Simulate what this image calls for only, under --light or --lights and --view (see "
               "iccbrdf plan).")  # fmt: skip
+@click.option("--budget", type=FiniteRange(min=0), metavar="DE",
+              help="With --for, instead of --tolerance: the quickest profiles whose proof is within this "
+              "CIEDE2000, as measured on the image (see iccbrdf cost).")  # fmt: skip
 @plan_options
 @click.option("--fresnel-angle", type=click.Choice(("theta_i", "alpha")),
               help="Angle of the Fresnel term: of incidence, as printed (the default), or between half "
@@ -85,6 +91,7 @@ def command(
     effects: str | None,
     without: str | None,
     image: Path | None,
+    budget: float | None,
     lights: tuple[str, ...],
     tolerance: float,
     samples: Samples | None,
@@ -102,7 +109,7 @@ def command(
     mid.icc         the binding MID: a BRDF image, each parameter in 0..1
     mvis.icc        the MVIS: the model, light and view
     colour-mid.icc  the colour MID: XYZ of the flat print and normals; alone it gives the BRDF image
-    table-mid.icc   with --table: the colour MID, without slopes, as a table
+    table-mid.icc   with --table: the colour MID as a table
     table-v4.icc    with --table: the same for systems of ICC version 4, XYZ to parameters
     *.txt           listings of their programs, errors of the tables
 
@@ -110,6 +117,7 @@ def command(
     --light, --view and --env set the defaults that the profiles hold; whoever runs them may set others.
     With --for, the MID is that of the image's kind, and the bound of what is lost stands in the descriptions;
     the proof of the image is made both ways then, and exit code 1 says that the bound did not hold.
+    --budget measures the full profiles, those of some tolerances and tables, and makes the quickest of them.
     """
     if effects is not None and without is not None:
         raise UsageError("--effects and --without are two ways to say one thing: give one of them")
@@ -126,24 +134,38 @@ def command(
         fresnel_angle,
         environment(light, view, env),
     )
+    if image is None and (lights or tolerance or samples or channels or budget is not None):
+        raise UsageError("--budget, --lights, --tolerance, --samples and --channels belong to --for")
+    if image is not None and (effects is not None or without is not None or grid is not None):
+        raise UsageError("--for chooses the effects: leave out --effects, --without and --table")
+    measured: dict[str, Any] | None = None
     plan: dict[str, Any] | None = None
     plan_text: list[str] = []
     holds = True
     colour: ColourMid | None = None
+    if image is not None and budget is not None:
+        if lights or tolerance:
+            raise UsageError("--budget is measured under one light: leave out --lights and --tolerance")
+        # What measures is needed for this alone.
+        from iccbrdf.cli.cost import cheapest
+
+        best = cheapest(image, recipe, budget, samples, channels)
+        measured = {"budget": budget, "way": best.way.name, "max_delta_E_CIE2000": best.errors.max}
+        plan_text = [f"within {budget:g} for {image}: {best.way.name}, CIEDE2000 up to {best.errors.max:.2g}"]
+        if best.way.tolerance is None:
+            image, grid = None, None if best.way.grid is None else str(best.way.grid)
+        else:
+            tolerance = best.way.tolerance
     if image is not None:
-        if effects is not None or without is not None or grid is not None:
-            raise UsageError("--for chooses the effects: leave out --effects, --without and --table")
         # Images and a CMM are needed for this alone.
         from iccbrdf.cli.plan import plan_lines, plan_result, planned
 
-        found, check = planned(image, recipe, lights, recipe.variables, tolerance, samples, channels)
+        found, check = planned(image, recipe, lights, tolerance, samples, channels)
         pair, colour = found.reduced.pair, found.reduced.colour
         plan = {"image": str(image), **plan_result(found, check)}
-        plan_text = [f"for {image}:", *plan_lines(found, check)]
+        plan_text += [f"for {image}:", *plan_lines(found, check)]
         holds = check.dE <= max(found.decision.bound, ROUNDING)
     else:
-        if lights or tolerance or samples or channels:
-            raise UsageError("--lights, --tolerance, --samples and --channels belong to --for")
         only = name_list(effects) if effects is not None else None
         pair = recipe.pair(name_list(without or ""), effects=only)
         wanted = interpolation is not None or slopes is not None or grid is not None
@@ -154,7 +176,13 @@ def command(
     if grid is not None:
         if (p, exponent) != (2, -1):
             raise UsageError("--table holds the published interpolation with --p 2 and --exponent -1 only")
-        tables = build_tables(source, method=interpolation or "smooth", grid=int(grid))
+        tables = build_tables(
+            source,
+            method=interpolation or "smooth",
+            grid=int(grid),
+            slopes=recipe.slopes,
+            slope_method=recipe.slope_method,
+        )
         built |= tables.files
     make_folder(folder)
     files = {folder / name: data for name, data in built.items()}
@@ -172,6 +200,7 @@ def command(
         "executed": compiled.executed,
         "colour_mid_executed": colour.compiled.executed if colour else None,
         "tables": [asdict(error) for error in tables.errors] if tables else [],
+        "measured": measured,
         "plan": plan,
         "files": [str(file) for file in files],
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from iccbrdf.build.spans import Directions
 from iccbrdf.cli.options import emit, environment, json_option, name_list, plan_options, scene_options
 from iccbrdf.errors import UsageError
 from iccbrdf.images import Samples, open_tiff
-from iccbrdf.planning import Check, ScenePlan, check_image, plan_image
+from iccbrdf.planning import Check, Planning, ScenePlan, check_image
 from iccbrdf.scene import LIGHT, VIEW, parse_direction, parse_number
 
 MAX_CHECKS = 8
@@ -74,9 +74,9 @@ def command(
         read_slopes(slopes) if slopes is not None else None,
         interpolation,
         slope_method,
+        variables=environment(light, view, env),
     )
-    variables = environment(light, view, env)
-    plan, check = planned(image, recipe, lights, variables, tolerance, samples, channels)
+    plan, check = planned(image, recipe, lights, tolerance, samples, channels)
     result = {"image": str(image), "primaries": str(primaries), **plan_result(plan, check)}
     emit(as_json, "iccbrdf.plan/1", result, "\n".join([f"{image}:", *plan_lines(plan, check)]))
 
@@ -85,34 +85,22 @@ def planned(
     image: Path,
     recipe: Recipe,
     lights: Sequence[str],
-    variables: Mapping[str, float],
     tolerance: float,
     samples: Samples | None,
     channels: str | None,
 ) -> tuple[ScenePlan, Check]:
-    """The plan of an image under `lights`, or the light that `variables` set, and its check."""
-    own = recipe.pair().compiled.variables
-    values = {**own, **variables}
+    """The plan of an image under `lights`, or else the light that the recipe sets, and its check."""
+    values = recipe.pair().compiled.variables
     directions = _directions(lights, [values[name] for name in LIGHT])
     eye = np.array([[values[name] for name in VIEW]])
-    if not np.any(eye) or not np.all(np.any(directions.examples, axis=1)):
-        raise UsageError("light and view: found a vector of length 0, which has no direction")
     declared = name_list(channels) if channels is not None else None
     with open_tiff(image, samples) as source:
-        plan = plan_image(
-            source,
-            recipe,
-            directions,
-            Directions.single(eye, ["view"]),
-            tolerance=tolerance,
-            env=variables,
-            names=declared,
-        )
+        planning = Planning(source, recipe, declared)
+        eyes = Directions.single(eye, ["view"])
+        plan = planning.plan(directions, eyes, tolerance=tolerance)
         chosen = np.unique(np.linspace(0, len(directions) - 1, MAX_CHECKS).round().astype(int))
-        scenes = [
-            {**variables, **dict(zip(LIGHT, directions.examples[i].tolist(), strict=True))} for i in chosen
-        ]
-        return plan, check_image(source, plan, scenes)
+        examples = directions.examples[chosen].tolist()
+        return plan, check_image(plan, [dict(zip(LIGHT, example, strict=True)) for example in examples])
 
 
 def _directions(texts: Sequence[str], light: Sequence[float]) -> Directions:
@@ -142,7 +130,7 @@ def plan_result(plan: ScenePlan, check: Check) -> dict[str, Any]:
     """A plan for JSON."""
     seconds = dict(plan.seconds)
     return {
-        "kind": "XYZ" if plan.is_colour else "BRDF",
+        "kind": "XYZ" if plan.planning.is_colour else "BRDF",
         "tolerance": plan.tolerance,
         "effects": [
             {
