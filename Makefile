@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: demo test lint types profiles figures bench clean
+.PHONY: demo test lint types profiles figures cost bench fuzz clean
 
 # The environment is remade when the dependencies change.
 $(VENV)/installed: pyproject.toml
@@ -31,9 +31,18 @@ figures: demo
 	$(BIN)/python tools/make_figures.py
 	$(BIN)/python tools/report_colour_mid.py
 
-# Ratios only: absolute times are those of the machine.  Minutes.
+# Ratios only: absolute times are those of the machine.  Minutes, and 8 GB of disk for a while.
 bench: $(VENV)/installed
+	$(BIN)/python tools/bench.py
 	$(BIN)/python tools/bench_fit.py
+
+cost: $(VENV)/installed
+	$(BIN)/python tools/make_cost.py
+
+# Hours, if one likes.
+fuzz: $(VENV)/installed
+	$(BIN)/python tools/hard_cases.py
+	$(BIN)/python -m tests.fuzz
 
 clean:
 	rm -rf $(VENV) demo build *.egg-info .mypy_cache .ruff_cache .pytest_cache
