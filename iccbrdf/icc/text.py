@@ -101,8 +101,9 @@ def _number(value: Any) -> Any:
     if isinstance(value, np.integer):
         return int(value)
     if math.isfinite(value):
-        single = np.float32(value) if abs(value) < 1e38 else value
-        return float(str(single if single == value else value))
+        exact = float(value)
+        single = np.float32(exact) if abs(exact) < 1e38 else exact
+        return float(str(single if single == exact else exact))
     return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import threading
+from itertools import islice
 from operator import index
 from typing import Any
 
@@ -23,6 +24,8 @@ from iccbrdf.images.blocks import Array, Grid
 MAX_SEGMENT_BYTES = 1 << 28
 MAX_SAMPLES = 1 << 40
 MAX_CHANNELS = 256
+MAX_PAGES = 64
+"""Thumbnails and other reductions included.  Those of a damaged file may point to each other for ever."""
 
 _DTYPES = ("u1", "u2", "f2", "f4", "f8")
 _PHOTOMETRICS = ("MINISBLACK", "RGB", "SEPARATED")
@@ -209,7 +212,10 @@ class TiffStorage:
 
 def _only_image(file: Any, path: StrPath, photometrics: tuple[str, ...]) -> Any:
     """The one page of a file that is neither a thumbnail nor another reduction."""
-    pages = [page for page in file.pages if not page.is_reduced]
+    found = list(islice(file.pages, MAX_PAGES + 1))
+    if len(found) > MAX_PAGES:
+        raise LimitError(f"{path}: more than {MAX_PAGES} images in one file")
+    pages = [page for page in found if not page.is_reduced]
     if not pages:
         raise InputError(f"{path}: damaged TIFF: there is no image in it")
     if len(pages) != 1:

@@ -185,7 +185,8 @@ def read_cornell(path: StrPath) -> Table:
         found = line.partition("#")[0].split()
         tokens += found
         places += [number] * len(found)
-    if not tokens or not tokens[0].isdecimal() or not 0 < int(tokens[0]) < len(tokens):
+    # Python reads no integer of thousands of digits.
+    if not tokens or not (tokens[0].isdecimal() and len(tokens[0]) < 10) or not 0 < int(tokens[0]) < len(tokens):
         raise InputError(
             f"{path}: begins with {tokens[0]!r}, expected the number of wavelengths"
             if tokens
