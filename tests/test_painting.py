@@ -2,38 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import imagecodecs
 import numpy as np
 import pytest
 from conftest import ROOT
+from painting import CHANNELS, SRGB_TO_XYZ, read_painting
 
 import iccbrdf
 from iccbrdf.brdf.geometry import direction
 from iccbrdf.brdf.ward import ward
 from iccbrdf.cli import main
 from iccbrdf.images import Block, create_tiff, open_tiff
-from iccbrdf.images.normals import read_normal_map
 
-# Linear sRGB to XYZ (D65), IEC 61966-2-1.
-SRGB_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
-CHANNELS = ("Rd.X", "Rd.Y", "Rd.Z", "ks", "m", "n.x", "n.y", "n.z")
 SIDES = {"left": 180, "top": 90, "right": 0, "bottom": 270}
 PROFILES = [ROOT / "profiles" / "ward_painting" / name for name in ("mid.icc", "mvis.icc")]
-
-
-def read_painting(folder: Path) -> np.ndarray:
-    """The painting's BRDF image in real values, float32 (height, width, 8), without its invalid border."""
-    kd, ks, gloss = (
-        imagecodecs.imread(folder / f"{name}map_level2.png")[..., :3] / 255 for name in ("kd", "ks", "gl")
-    )
-    normals = read_normal_map(folder / "nomap_level2.png")
-    # The formula of the painting's viewer: gloss 0 is rough (m = .6), gloss 1 smooth (m = .05).
-    least, most = 1 - 0.6**0.25, 1 - 0.05**0.25
-    m = (1 - gloss[..., :1] * (most - least) - least) ** 4
-    image = np.concatenate([kd @ SRGB_TO_XYZ.T, ks.mean(axis=2, keepdims=True), m, normals], axis=2)
-    return image[40:-40, 40:-40].astype(np.float32)
 
 
 @pytest.fixture(scope="module")

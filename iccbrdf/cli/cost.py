@@ -25,7 +25,7 @@ from iccbrdf.cli.options import (
     scene_options,
 )
 from iccbrdf.cli.pipeline import open_image
-from iccbrdf.errors import UsageError
+from iccbrdf.errors import UsageError, nearest
 from iccbrdf.files import check_target, make_folder, write_together
 from iccbrdf.images import Samples
 from iccbrdf.planning import Planning
@@ -73,6 +73,9 @@ Examples:
               help="Recommend the most accurate way within so many nanoseconds a pixel.")  # fmt: skip
 @click.option("--by", "statistic", type=click.Choice(STATISTICS), default="max", show_default=True,
               help="Which error of the pixels counts: the largest, the 95 % point, or the mean.")  # fmt: skip
+@click.option("--show", "shown", metavar="WAY",
+              help="Draw the errors of this way, named as in the table.  Default: of the recommended one, or "
+              "of float32.")  # fmt: skip
 @click.option("--pixels", type=click.IntRange(1), default=PIXELS, show_default=True,
               help="Of a larger image, a sample of tiles with so many pixels is measured.")  # fmt: skip
 @click.option("--runs", type=click.IntRange(1), default=RUNS, show_default=True,
@@ -92,6 +95,7 @@ def command(
     budget: float | None,
     ns: float | None,
     statistic: Statistic,
+    shown: str | None,
     pixels: int,
     runs: int,
     light: str | None,
@@ -107,7 +111,7 @@ def command(
     \b
     cost.json, cost.md  the numbers, and the table of them
     cost.png            time against error
-    cost_errors.png     where the recommended way errs (float32 where there is none), and its worst tiles
+    cost_errors.png     where a way errs, and its worst tiles
 
     Exit code 1 says that no way is within the budget.
     """
@@ -144,7 +148,7 @@ def command(
     contents = {
         "cost.json": (json.dumps({"schema": SCHEMA, **result}, indent=1) + "\n").encode(),
         "cost.md": markdown(report).encode(),
-        **pictures(report, image.name, best, budget),
+        **pictures(report, image.name, best, budget, shown),
     }
     write_together({targets[name]: data for name, data in contents.items()}, overwrite=force)
     lines = [
@@ -159,13 +163,43 @@ def command(
         sys.exit(CHECK_FAILED)
 
 
-def pictures(report: CostReport, title: str, best: Cost | None, budget: float | None) -> dict[str, bytes]:
-    """The pictures of a report, by the names of their files."""
-    shown = best or next(cost for cost in report.costs if cost.way == PLAIN)
+def cheapest(
+    image: Path, recipe: Recipe, budget: float, samples: Samples | None, channels: str | None
+) -> Cost:
+    """The quickest of the ways that are a matter of profiles alone whose errors are all within a budget.
+
+    Raises UsageError where there is none.
+    """
+    with open_image(image, samples) as source:
+        planning = Planning(source, recipe, name_list(channels) if channels is not None else None)
+        report = measure_image(
+            planning, recipe.variables, only=lambda way: way.is_built, backends=(), told=_progress()
+        )
+    best = recommend(report.costs, budget=budget)
+    if best is None:
+        least = min(report.costs, key=lambda cost: cost.errors.max)
+        raise UsageError(
+            f"--budget {budget:g}: no profiles are within it; nearest is {least.way.name} "
+            f"with {least.errors.max:.2g}"
+        )
+    return best
+
+
+def pictures(
+    report: CostReport, title: str, best: Cost | None, budget: float | None, shown: str | None = None
+) -> dict[str, bytes]:
+    """The pictures of a report by the names of their files; `shown` names the way whose errors are drawn.
+
+    Raises UsageError where there is no such way.
+    """
+    by_name = {cost.way.name: cost for cost in report.costs}
+    name = shown or (best.way if best else PLAIN).name
+    if name not in by_name:
+        raise UsageError(f"--show: no way {name!r} was measured: {nearest(name, by_name)}")
     heading = f"Ways to the proof of {title}"
     return {
         "cost.png": plot_front(report, title=heading, recommended=best, budget=budget),
-        "cost_errors.png": plot_errors(report, shown),
+        "cost_errors.png": plot_errors(report, by_name[name]),
     }
 
 

@@ -330,6 +330,8 @@ def _in_turns(works: Sequence[Callable[[], Any]], runs: int) -> list[float]:
 
 def _backends(scene: CostScene, exact: Array, names: Sequence[str], runs: int) -> tuple[Backend, ...]:
     """The plain way by one back end after the other, on the first tiles."""
+    if not names:
+        return ()
     count = max(1, _BACKEND_PIXELS // scene.tiles[0, ..., 0].size)
     tiles, white = scene.tiles[:count], scene.recipe.primaries.white
     profiles = make_ready(PLAIN, scene, _no_plan).profiles

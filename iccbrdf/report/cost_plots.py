@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Panel = tuple[str, NDArray[np.float32], dict[str, Any]]
+"""A name, a picture and how it is coloured."""
+
 WORST = 10
 """Tiles that are shown."""
 
@@ -48,38 +51,55 @@ _LONGEST_SIDE = 900
 def plot_front(
     report: CostReport, *, title: str, recommended: Cost | None, budget: float | None = None
 ) -> bytes:
-    """Time a pixel against the largest error, both logarithmic, with the Pareto front.
+    """Time a pixel against error, both logarithmic, with the Pareto front.
 
-    A line goes from each way's mean error to its largest.
+    The marker of a way stands at its largest error; a line goes down to the mean.
     """
-    figure = _figure(10, 6.4)
+    figure = _figure(10, 7)
     axes = figure.subplots()
-    axes.set(xscale="log", yscale="log", xlabel="nanoseconds a pixel (one thread)",
-             ylabel="error, CIEDE2000: mean to largest", title=title)  # fmt: skip
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="time, nanoseconds a pixel (one thread)",
+        ylabel="error, CIEDE2000 (marker: largest; line down to the mean)",
+        title=title,
+    )
     front = pareto(report.costs)
-    axes.step([c.ns for c in front], [_height(c, "max") for c in front], where="post", color="black",
-              linewidth=1.2, label="Pareto front: nothing is both faster and nearer", zorder=1)  # fmt: skip
+    heights = [_height(cost, "max") for cost in front]
+    axes.step([cost.ns for cost in front], heights, "k", where="post", linewidth=1.2, label="Pareto front")
     seen: set[str] = set()
     for cost in report.costs:
         marker, colour = _STYLES[cost.way.axis]
-        label = None if cost.way.axis in seen else cost.way.axis
-        seen.add(cost.way.axis)
         low, high = _height(cost, "mean"), _height(cost, "max")
-        axes.plot([cost.ns, cost.ns], [low, high], color=colour, linewidth=0.8, alpha=0.5, zorder=1)
-        axes.plot(cost.ns, high, marker, color=colour, label=label, markersize=9 if marker == "*" else 7,
-                  markerfacecolor=colour if cost.way.same_answer else "none", zorder=3)  # fmt: skip
+        axes.plot([cost.ns, cost.ns], [low, high], color=colour, linewidth=0.8, alpha=0.5)
+        axes.plot(
+            cost.ns,
+            high,
+            marker,
+            color=colour,
+            label=None if cost.way.axis in seen else _legend(cost),
+            markersize=10 if marker == "*" else 7,
+            markerfacecolor=colour if cost.way.same_answer else "none",
+            zorder=3,
+        )
+        seen.add(cost.way.axis)
     if recommended is not None:
-        axes.plot(recommended.ns, _height(recommended, "max"), "o", markersize=16, markerfacecolor="none",
-                  markeredgecolor="black", label="recommended", zorder=2)  # fmt: skip
+        height = _height(recommended, "max")
+        axes.plot(recommended.ns, height, "o", color="black", markersize=15, markerfacecolor="none",
+                  label="recommended")  # fmt: skip
     if budget is not None:
         axes.axhline(budget, color="black", linestyle=":", linewidth=0.8)
-        axes.annotate(f"budget {budget:g}", (1, budget), xycoords=("axes fraction", "data"), ha="right",
-                      va="bottom", fontsize=8)  # fmt: skip
+        axes.annotate(f"budget {budget:g} ", (1, budget), xycoords=("axes fraction", "data"),
+                      horizontalalignment="right", verticalalignment="bottom", fontsize=8)  # fmt: skip
     _widen(axes, report.costs)
-    axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
-    figure.subplots_adjust(left=0.08, right=0.78, bottom=0.09, top=0.93)
+    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=5, frameon=False)
+    figure.subplots_adjust(left=0.09, right=0.97, bottom=0.16, top=0.95)
     _label(figure, axes, report.costs, front)
     return _png(figure)
+
+
+def _legend(cost: Cost) -> str:
+    return cost.way.axis if cost.way.same_answer else f"{cost.way.axis} (another answer)"
 
 
 def _height(cost: Cost, statistic: Statistic) -> float:
@@ -143,51 +163,81 @@ def _names_around(axes: Axes, cost: Cost, *, is_bold: bool) -> Iterator[Any]:
                 fontweight="bold" if is_bold else "normal",
                 color="black" if is_bold else "0.3",
                 arrowprops=line,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
             )
 
 
 def plot_errors(report: CostReport, cost: Cost) -> bytes:
-    """Where one way errs: a map in false colours, and the worst tiles, exact, by the way, and the error."""
+    """Where one way errs: the exact proof, the errors in false colours, and the worst tiles of both."""
+    # Takes a second to import.
+    from matplotlib.colors import PowerNorm
+
     scene = report.scene
-    worst = np.argsort(-cost.dE.max(axis=(1, 2)), kind="stable")[:WORST]
-    largest = max(float(cost.dE.max()), 1e-9)
-    figure = _figure(12, 9.5)
-    grid = figure.add_gridspec(4, WORST, height_ratios=(6, 1, 1, 1), hspace=0.08, wspace=0.06,
-                               left=0.06, right=0.93, bottom=0.02, top=0.94)  # fmt: skip
-    overview = figure.add_subplot(grid[0, :])
-    colours: dict[str, Any] = {"cmap": "inferno", "vmin": 0, "vmax": largest, "interpolation": "nearest"}
-    height, width = scene.size
-    shown = overview.imshow(_map(report, cost.dE), extent=(0, width, height, 0), **colours)
-    overview.set_facecolor("0.6")
-    sampled = "" if scene.is_whole else "; grey: not in the sample"
-    overview.set_title(f"{cost.way.name}: CIEDE2000 to the exact proof{sampled}")
-    figure.colorbar(shown, ax=overview, fraction=0.03, pad=0.01)
-    exact = scene.exact(scene.tiles[worst])
-    proofs = [_as_seen(report, XYZ) for XYZ in (exact, cost.proof(scene.tiles[worst]))]
     down, across = cost.dE.shape[1:]
+    worst = _worst(report, cost)
+    # By roots: large errors are few, and the small ones beside them shall be seen.
+    norm = PowerNorm(0.5, 0, max(float(cost.dE.max()), _FLOOR))
+    colours: dict[str, Any] = {"cmap": "inferno", "norm": norm, "interpolation": "nearest"}
+    figure = _figure(12, 9.6)
+    grid = figure.add_gridspec(4, WORST, height_ratios=(6, 1.15, 1.15, 1.15), hspace=0.14, wspace=0.06,
+                               left=0.04, right=0.93, bottom=0.02, top=0.95)  # fmt: skip
+    height, width = scene.size
+    exact = _as_seen(report, scene.exact(scene.tiles))
+    note = "" if scene.is_whole else " (grey: not in the sample)"
+    halves: tuple[Panel, ...] = (
+        (f"exact proof{note}", _spread(report, exact), {}),
+        (f"{cost.way.name}: CIEDE2000 to it", _spread(report, cost.dE), colours),
+    )
+    overviews = []
+    for i, (title, picture, how) in enumerate(halves):
+        axes = figure.add_subplot(grid[0, i * WORST // 2 : (i + 1) * WORST // 2])
+        shown = axes.imshow(picture, extent=(0, width, height, 0), **how)
+        axes.set(title=title, xticks=[], yticks=[], facecolor="0.6")
+        overviews.append(axes)
+    figure.colorbar(shown, cax=overviews[-1].inset_axes((1.02, 0, 0.03, 1)))
+    found = _as_seen(report, cost.proof(scene.tiles[worst]))
     for j, tile in enumerate(worst):
         y, x = scene.places[tile]
-        overview.add_patch(_rectangle(x, y, across, down))
-        overview.annotate(str(j + 1), (x + across, y), color="cyan", fontsize=8, va="top")
-        pictures = (proofs[0][j], proofs[1][j], cost.dE[tile])
-        for i, (picture, name) in enumerate(zip(pictures, ("exact", "this way", "error"), strict=True)):
+        for axes in overviews:
+            axes.add_patch(_rectangle(x, y, across, down))
+            axes.annotate(str(j + 1), (x + across, y), color="cyan", fontsize=8, verticalalignment="top")
+        rows: tuple[Panel, ...] = (
+            ("exact", exact[tile], {}),
+            ("this way", found[j], {}),
+            ("error", cost.dE[tile], colours),
+        )
+        for i, (name, picture, how) in enumerate(rows):
             axes = figure.add_subplot(grid[i + 1, j])
-            axes.imshow(picture, **colours)
-            axes.set(xticks=[], yticks=[])
-            if j == 0:
-                axes.set_ylabel(name)
+            axes.imshow(picture, **{"interpolation": "nearest", **how})
+            axes.set(xticks=[], yticks=[], ylabel=name if j == 0 else "")
             if i == 0:
                 axes.set_title(f"{j + 1}: {cost.dE[tile].max():.2g}", fontsize=8)
     return _png(figure)
 
 
-def _map(report: CostReport, dE: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A smaller picture of the largest error that falls on each of its pixels, NaN where none does."""
+def _worst(report: CostReport, cost: Cost) -> list[int]:
+    """The tiles with the largest errors, none of which overlaps another."""
+    down, across = cost.dE.shape[1:]
+    places = report.scene.places
+    chosen: list[int] = []
+    for tile in np.argsort(-cost.dE.max(axis=(1, 2)), kind="stable"):
+        y, x = places[tile]
+        if all(abs(y - places[i][0]) >= down or abs(x - places[i][1]) >= across for i in chosen):
+            chosen.append(int(tile))
+    return chosen[:WORST]
+
+
+def _spread(report: CostReport, tiles: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Tiles (n, height, width, ...) where they lie in a picture of the image, NaN elsewhere.
+
+    It is a smaller one where the image is large; the largest value counts that falls on a pixel.
+    """
     scene = report.scene
     step = max(1, -(-max(scene.size) // _LONGEST_SIDE))
-    picture = np.full([-(-length // step) for length in scene.size], np.nan, np.float32)
-    down, across = (np.arange(length) for length in dE.shape[1:])
-    for (y, x), tile in zip(scene.places, dE, strict=True):
+    shape = [-(-length // step) for length in scene.size]
+    picture = np.full((*shape, *tiles.shape[3:]), np.nan, np.float32)
+    down, across = (np.arange(length) for length in tiles.shape[1:3])
+    for (y, x), tile in zip(scene.places, tiles, strict=True):
         rows, columns = np.meshgrid((y + down) // step, (x + across) // step, indexing="ij")
         np.fmax.at(picture, (rows, columns), tile)
     return picture

@@ -55,8 +55,11 @@ class Way:
 
     @property
     def same_answer(self) -> bool:
-        """Whether it approximates what was asked for, rather than another method or model."""
-        return self.interpolation is None and self.model is None
+        """Whether it approximates what was asked for, rather than another method or model.
+
+        BRDF2 with the one roughness of BRDF1 three times is the same, but BRDF1 with one of BRDF2's is not.
+        """
+        return self.interpolation is None and self.model in (None, "brdf2")
 
     @property
     def is_built(self) -> bool:
