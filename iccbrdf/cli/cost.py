@@ -160,7 +160,7 @@ def command(
     ]
     emit(as_json, SCHEMA, result, "\n".join(lines))
     if best is None:
-        sys.exit(CHECK_FAILED)
+        click.get_current_context().exit(CHECK_FAILED)
 
 
 def cheapest(

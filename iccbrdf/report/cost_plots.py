@@ -245,7 +245,7 @@ def _spread(report: CostReport, tiles: NDArray[np.float32]) -> NDArray[np.float3
 
 def _as_seen(report: CostReport, XYZ: Array) -> NDArray[np.float32]:
     """XYZ (n, height, width, 3) in sRGB, clipped."""
-    to_display = standard_XYZ(report.scene.recipe.pair().mvis)
+    to_display = standard_XYZ(report.scene.pair.mvis)
     flat = to_display(XYZ.astype(np.float32)).reshape(1, -1, 3)
     return xyz_to_srgb(flat).clip(0, 1).reshape(XYZ.shape)
 

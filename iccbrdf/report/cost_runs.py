@@ -98,16 +98,18 @@ def _linked(way: Way, scene: CostScene, plan: Callable[[float], ScenePlan]) -> R
             names, columns = _roughness_columns(names, way.model)
     if way.interpolation is not None:
         recipe = replace(recipe, interpolation=way.interpolation)
-    pair = recipe.pair()
-    mid, mvis = pair.mid, pair.mvis
+    mid, mvis = scene.mid, scene.pair.mvis
     if way.tolerance is not None:
         found = plan(way.tolerance)
         mid, mvis = found.reduced.chain
         bound = found.decision.bound
-    elif scene.is_colour:
-        mid = _table_mid(way.grid, scene) if way.grid is not None else recipe.colour_mid().mid
+    elif way.grid is not None:
+        mid = _table_mid(way.grid, scene)
+    elif recipe != scene.recipe:
+        pair = recipe.pair()
+        mid, mvis = recipe.colour_mid().mid if scene.is_colour else pair.mid, pair.mvis
     if way.literal:
-        mvis, _ = literal_mvis(pair, recipe.primaries.model)
+        mvis, _ = literal_mvis(scene.pair, recipe.primaries.model)
     transform = link(
         [mid, mvis],
         env=_known(scene, mvis),
@@ -133,8 +135,7 @@ def _by_version_4(way: Way, scene: CostScene) -> Ready:
 
     The profile's 16-bit tag runs in this CMM, on XYZ that is adjusted to the slope and rounded as its input.
     """
-    recipe, names = scene.recipe, scene.names
-    pair = recipe.pair()
+    recipe, names, pair = scene.recipe, scene.names, scene.pair
     parameters = MODELS[recipe.primaries.model].channels
     table = build_table_profile(recipe.primaries, method=_method(scene), grid=way.grid or 0)[0]
     mid = _version_4_mid(scene, table)
@@ -173,9 +174,7 @@ def _version_4_mid(scene: CostScene, table: Profile) -> Profile:
 
 def _reduced(way: Way, scene: CostScene) -> Ready:
     """Parameters of an image with shorter sides, interpolated; normals and reflection of every pixel."""
-    recipe, names = scene.recipe, scene.names
-    pair = recipe.pair()
-    mid = recipe.colour_mid().mid if scene.is_colour else pair.mid
+    names, pair, mid = scene.names, scene.pair, scene.mid
     to_parameters = link([mid], channels=names, samples=scene.samples)
     channels = to_parameters.channels_out
     reflect = held(link([pair.mvis], env=_known(scene, pair.mvis), channels=channels))

@@ -14,8 +14,10 @@ from iccbrdf.brdf.geometry import Array, tan2_theta_h, unit
 from iccbrdf.brdf.interpolation import InterpolationMethod, interpolate
 from iccbrdf.brdf.models import MODELS, NORMAL, evaluate
 from iccbrdf.brdf.slopes import SlopeMethod, slope_adjust, slope_angle
+from iccbrdf.build.pair import Pair
 from iccbrdf.build.profiles import ranges
 from iccbrdf.build.recipe import Recipe
+from iccbrdf.icc import Profile
 from iccbrdf.images import Place
 from iccbrdf.planning import Planning
 from iccbrdf.scene import LIGHT, VIEW
@@ -71,9 +73,19 @@ class CostScene:
         return len(self.places) == len(_starts(height, down)) * len(_starts(width, across))
 
     @cached_property
+    def pair(self) -> Pair:
+        """The binding MID and the MVIS, with all effects."""
+        return self.recipe.pair()
+
+    @cached_property
+    def mid(self) -> Profile:
+        """The MID that takes the image."""
+        return self.recipe.colour_mid().mid if self.is_colour else self.pair.mid
+
+    @cached_property
     def variables(self) -> dict[str, float]:
         """All run-time variables, with the profiles' own values where `env` names none."""
-        return {**self.recipe.pair().compiled.variables, **self.env}
+        return {**self.pair.compiled.variables, **self.env}
 
     @property
     def light(self) -> Array:
@@ -127,7 +139,7 @@ class CostScene:
 
     def _real(self, tiles: Tiles) -> dict[str, Array]:
         """Physical values by channel; what the image lacks has the profiles' default, without axes."""
-        compiled = self.recipe.pair().compiled
+        compiled = self.pair.compiled
         defaults = zip(compiled.inputs, compiled.defaults, strict=True)
         values: dict[str, Array] = {name: np.array(value) for name, value in defaults}
         limits = ranges(self.names, {} if self.is_colour else self.recipe.primaries.encoding)
