@@ -103,7 +103,7 @@ def measured(scene: Print) -> CostReport:
 def write_costs(scenes: Mapping[str, Print], folder: Path) -> None:
     """The reports of all scenes."""
     numbers: dict[str, Any] = {"machine": machine()}
-    page = ["# What accuracy costs", f"Made by `make cost` on {machine()}.\n"]
+    page = ["# What accuracy costs\n", f"Made by `make cost` on {machine()}.\n"]
     for name, scene in scenes.items():
         print(scene.title, file=sys.stderr)
         report = measured(scene)
