@@ -48,8 +48,8 @@ def test_json(run, tmp_path):
     assert built["schema"] == "iccbrdf.build/1"
     assert built["model"] == "brdf1"
     assert built["effects"] == [
-        "specular", "fresnel", "shadowing", "chromatic-specular", "relief", "below-horizon", "highlight-range",
-        "interpolation",
+        "specular", "fresnel", "shadowing", "chromatic-specular", "relief", "below-horizon",
+        "highlight-range", "interpolation",
     ]  # fmt: skip
     assert built["channels"] == ["kd.X", "kd.Y", "kd.Z", "ks.X", "ks.Y", "ks.Z", "m", "n.x", "n.y", "n.z"]
     assert built["variables"]["litI"] == np.pi

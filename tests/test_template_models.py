@@ -188,7 +188,7 @@ def test_leaving_out_an_effect_makes_a_shorter_program_that_runs(model):
     full = compiled(model)
     for effect, on in full.effects.items():
         program = compiled(model, **{effect: not on})
-        # One roughness or gloss for X, Y and Z saves a channel, but no operator of vectors; a limit costs some.
+        # One roughness or gloss for X, Y and Z saves a channel, but no operator; a limit costs some.
         shorter = program.executed < full.executed or effect.startswith(("chromatic", "highlight"))
         assert shorter, effect
         assert np.all(np.isfinite(scene.run(program)))

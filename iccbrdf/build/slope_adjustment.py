@@ -16,7 +16,7 @@ TEMPLATE = "slope_adjust.calc"
 
 
 def check_slopes(primaries: Primaries, slopes: Slopes) -> None:
-    """Raise InputError for slopes that colours cannot be adjusted to, or of other conditions than `primaries`."""
+    """InputError for slopes that colours cannot be adjusted to, or of other conditions than `primaries`."""
     file = slopes.file or "slopes"
     if len(slopes.slopes) < 2:
         raise InputError(f"{file}: found the flat print alone, expected at least one slope beside it")

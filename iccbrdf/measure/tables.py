@@ -18,9 +18,11 @@ import numpy as np
 
 from iccbrdf.brdf.geometry import Array
 from iccbrdf.errors import InputError
-from iccbrdf.files import StrPath
+from iccbrdf.files import StrPath, read_whole
 from iccbrdf.measure.declarations import SCHEMA, header_declarations
 
+MAX_BYTES = 1 << 27
+"""Of a table's text, which takes up to twenty times its bytes in memory."""
 MISSING = ("", "nan", "-", "n/a", "na")
 """What stands for a reading that is not there, in lower case."""
 
@@ -78,12 +80,10 @@ def read_text(path: StrPath) -> str:
     ------
     InputError
         The file cannot be read or is not text.
+    LimitError
+        The file is larger than MAX_BYTES.
     """
-    try:
-        with open(path, "rb") as stream:
-            data = stream.read()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    data = read_whole(path, MAX_BYTES)
     if b"\0" in data:
         raise InputError(f"{path}: is not a text file: it holds bytes of value 0")
     try:
@@ -186,7 +186,8 @@ def read_cornell(path: StrPath) -> Table:
         tokens += found
         places += [number] * len(found)
     # Python reads no integer of thousands of digits.
-    if not tokens or not (tokens[0].isdecimal() and len(tokens[0]) < 10) or not 0 < int(tokens[0]) < len(tokens):
+    is_count = bool(tokens) and tokens[0].isdecimal() and len(tokens[0]) < 10
+    if not is_count or not 0 < int(tokens[0]) < len(tokens):
         raise InputError(
             f"{path}: begins with {tokens[0]!r}, expected the number of wavelengths"
             if tokens
