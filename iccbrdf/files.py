@@ -1,4 +1,4 @@
-"""Output files that appear whole or not at all, and replace nothing unless asked."""
+"""Inputs up to a size; outputs that appear whole or not at all, and replace nothing unless asked."""
 
 from __future__ import annotations
 
@@ -9,11 +9,33 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from iccbrdf.errors import LimitError, UsageError
+from iccbrdf.errors import InputError, LimitError, UsageError
 
 StrPath = str | os.PathLike[str]
 
 _NO_SPACE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+
+
+def read_whole(path: StrPath, most: int) -> bytes:
+    """All bytes of a user's file, of which there may be `most`, whatever the file says of its size.
+
+    Raises
+    ------
+    InputError
+        The file is missing or cannot be read.
+    LimitError
+        It is larger.
+    """
+    try:
+        with open(path, "rb") as file:
+            data = file.read(most + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except (TypeError, ValueError) as error:
+        raise InputError(f"not the path of a file to read: {error}") from None
+    if len(data) > most:
+        raise LimitError(f"{path}: larger than the limit of {most} bytes")
+    return data
 
 
 def check_target(path: StrPath, *, overwrite: bool = False) -> Path:

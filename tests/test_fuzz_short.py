@@ -13,7 +13,7 @@ from fuzz.watch import TooSlow, Watch, time_limit
 
 from iccbrdf.calc.operators import OPERATORS
 
-hypothesis = pytest.importorskip("hypothesis", reason="hypothesis is not installed: pip install 'iccbrdf[dev]'")
+pytest.importorskip("hypothesis", reason="hypothesis is not installed: pip install 'iccbrdf[dev]'")
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st

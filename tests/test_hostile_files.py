@@ -15,8 +15,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+from cmm_examples import device_profile, matrix
 
 import iccbrdf
+from iccbrdf.icc import read_profile, write_profile
+from iccbrdf.icc.xml import profile_to_xml
 from iccbrdf.images.tiff_storage import TiffStorage
 from iccbrdf.resources import folder
 
@@ -104,9 +107,6 @@ def simulated(tmp_path):
 def results_of(tmp_path):
     """Commands, each with one of the files that it writes."""
     xml = tmp_path / "in.xml"
-    from iccbrdf.icc import read_profile
-    from iccbrdf.icc.xml import profile_to_xml
-
     xml.write_bytes(profile_to_xml(read_profile(MVIS)))
     image = an_image(tmp_path / "in.tif", 8, 9)
     out = tmp_path / "out"
@@ -202,7 +202,6 @@ def test_a_profile_that_is_cut_off(run, tmp_path):
 def flawed(tmp_path):
     """An image in which four samples of three pixels are not finite, the first in row 3, column 7."""
     device = np.random.default_rng(5).uniform(0.4, 0.6, (20, 30, 10)).astype(np.float32)
-    device[..., 9] = 1
     device[3, 7, 2], device[3, 7, 9] = np.nan, np.inf
     device[3, 8, 0] = -np.inf
     device[19, 29, 5] = np.nan
@@ -216,11 +215,22 @@ def apply(run, tmp_path, image, *options):
     return result, tifffile.imread(tmp_path / "xyz.tif") if result.code == 0 else None
 
 
-def test_not_finite_is_kept_by_default(run, tmp_path, flawed):
-    result, xyz = apply(run, tmp_path, flawed)
+def test_not_finite_is_kept_by_default(run, tmp_path):
+    """A matrix passes it on; so do our models, whose MVIS then shows black."""
+    scanner = tmp_path / "scanner.icc"
+    write_profile(device_profile("scnr", A2B0=matrix(np.eye(3))), scanner)
+    image = tmp_path / "rgb.tif"
+    rgb = np.full((4, 5, 3), 0.5, np.float32)
+    rgb[1, 2, 0], rgb[3, 3] = np.nan, np.inf
+    tifffile.imwrite(image, rgb, photometric="rgb")
+    arguments = ["apply", image, "-p", scanner, "--samples", "device", "--json", "-o", tmp_path / "xyz.tif"]
+    result = run(*arguments)
     assert (result.json["nonfinite"], result.json["not_finite_in"]) == ("keep", 4)
     assert result.json["not_finite_out"] > 0
-    assert np.isnan(xyz[19, 29]).any()
+    assert np.isnan(tifffile.imread(tmp_path / "xyz.tif")[1, 2, 0])
+    result = run(*arguments, "--nonfinite", "zero", "--force")
+    assert (result.json["not_finite_in"], result.json["not_finite_out"]) == (4, 0)
+    assert not tifffile.imread(tmp_path / "xyz.tif")[[1, 3], [2, 3]].any()
 
 
 def test_not_finite_is_an_error(run, tmp_path, flawed):

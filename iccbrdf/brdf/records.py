@@ -10,7 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from iccbrdf.errors import InputError, nearest
-from iccbrdf.files import StrPath
+from iccbrdf.files import StrPath, read_whole
+
+MAX_BYTES = 1 << 24
+"""Of a JSON file, which takes up to thirty times its bytes in memory."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,8 @@ def read_record(path: StrPath, schema: str, version: int) -> Record:
     ------
     InputError
         The file cannot be read, is not JSON, states a key twice, or is of another schema or version.
+    LimitError
+        The file is larger than MAX_BYTES.
     """
     file = str(path)
 
@@ -115,11 +120,9 @@ def read_record(path: StrPath, schema: str, version: int) -> Record:
             values[key] = value
         return values
 
+    data = read_whole(path, MAX_BYTES)
     try:
-        with open(path, "rb") as stream:
-            values = json.loads(stream.read(), object_pairs_hook=once)
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}") from error
+        values = json.loads(data, object_pairs_hook=once)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{file}: is not a JSON file: {error}") from error
     if not isinstance(values, dict):

@@ -93,9 +93,7 @@ class Graph:
         """The node of this operator and these arguments; `width` matters where they leave it open."""
         arguments = tuple(arguments)
         width = _width(op, arguments, detail, width)
-        # -0 and 0 are equal keys, but not equal constants.
-        exact = tuple(map(float.hex, detail)) if op == "const" else detail
-        key = (op, tuple(argument.index for argument in arguments), exact, width)
+        key = (op, tuple(argument.index for argument in arguments), _exact(op, detail), width)
         node = self._known.get(key)
         if node is None:
             node = Node(len(self.nodes), op, arguments, detail, width)
@@ -153,6 +151,15 @@ def needed_by(nodes: Iterable[Node], skip: Callable[[Node], bool] = lambda node:
 
 
 # Rules -------------------------------------------------------------------------------------------------
+
+
+def _exact(op: str, detail: Any) -> Any:
+    """What tells details apart."""
+    if op == "const":
+        return tuple(map(float.hex, detail))  # -0 and 0 are equal, but not equal constants
+    if op in ("clut", "curve", "tint"):
+        return id(detail)  # to compare tables would take as long as to read them
+    return detail
 
 
 def is_truth(node: Node) -> bool:
@@ -274,8 +281,7 @@ def check(graph: Graph) -> None:
                 raise GraphError(f"{node} uses %{argument.index}, which does not come before it")
         if _width(node.op, node.arguments, node.detail, node.width) != node.width:
             raise GraphError(f"{node} has a wrong width")
-        exact = tuple(map(float.hex, node.detail)) if node.op == "const" else node.detail
-        key = (node.op, node.arguments, exact, node.width)
+        key = (node.op, node.arguments, _exact(node.op, node.detail), node.width)
         if key in seen:
             raise GraphError(f"{node} is there twice")
         seen.add(key)

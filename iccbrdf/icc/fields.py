@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -21,15 +21,23 @@ FloatArray: TypeAlias = npt.NDArray[np.floating[Any]]
 
 
 def frozen(values: Any, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
-    """A read-only copy as `dtype`; ValueError where a value is outside the range of `dtype`."""
+    """A read-only copy as `dtype`; ValueError where a value is outside the range of `dtype`.
+
+    What is read-only, of that type and owner of its numbers is given back as it is.
+    """
     given = np.asarray(values)
+    flags = given.flags
+    if given.dtype == dtype and flags.owndata and flags.c_contiguous and not flags.writeable:
+        return given
     with np.errstate(over="ignore", invalid="ignore"):
         array = np.array(given, dtype=dtype, order="C")
-        if array.dtype.kind == "f":
-            lost = np.isinf(array) & ~np.isinf(given.astype(np.float64))
+        if array.dtype == given.dtype:
+            lost = None  # tables may be large, and most are of this type
+        elif array.dtype.kind == "f":
+            lost = np.isinf(array) & ~np.isinf(given if given.dtype.kind == "f" else given.astype(np.float64))
         else:
             lost = array != given
-    if lost.any():
+    if lost is not None and lost.any():
         raise ValueError(f"found {given[lost].flat[0]}, which {array.dtype.name} cannot hold")
     array.setflags(write=False)
     return array
@@ -230,6 +238,8 @@ class Repeat(FieldType):
         return values
 
 
+_PIECE = 1 << 20
+
 ENCODINGS = ((">f4", 1), (">f2", 1), (">u2", 65535), (">u1", 255))
 """Storage type and divisor of the valueEncodingType 0 to 3."""
 
@@ -248,28 +258,45 @@ class Floats(FieldType):
     def read(self, reader: Reader, name: str, seen: Seen) -> FloatArray:
         shape = tuple(self.shape(seen))
         dtype, scale = ENCODINGS[seen.get("encoding", self.encoding)]
-        data = reader.take(math.prod(shape) * np.dtype(dtype).itemsize, name)
+        count = math.prod(shape)
+        data = reader.take(count * np.dtype(dtype).itemsize, name)
+        reader.count_numbers(count)
+        values = np.empty(shape, np.float32)
         with np.errstate(invalid="ignore"):  # a signalling NaN warns when it is widened
-            values = np.frombuffer(data, dtype).astype(np.float32)
-        return (values / np.float32(scale)).reshape(shape) if scale > 1 else values.reshape(shape)
+            values.reshape(-1)[:] = np.frombuffer(data, dtype)
+        if scale > 1:
+            values /= np.float32(scale)
+        values.setflags(write=False)
+        return values
 
     def write(self, out: bytearray, value: FloatArray, record: Any) -> None:
         dtype, scale = ENCODINGS[getattr(record, "encoding", self.encoding)]
-        if scale > 1:
-            value = np.rint(value.astype(np.float64) * scale)
-        out += value.astype(dtype).tobytes()
+        for piece in _pieces(value):
+            out += (np.rint(piece.astype(np.float64) * scale) if scale > 1 else piece).astype(dtype).tobytes()
 
     def normal(self, value: Any) -> FloatArray:
         return frozen(value, np.float32)
+
+
+def _pieces(values: FloatArray) -> Iterator[FloatArray]:
+    """All values, some at a time: as float64 a table takes up to eight times its bytes."""
+    flat = values.reshape(-1)
+    for start in range(0, flat.size, _PIECE):
+        yield flat[start : start + _PIECE]
 
 
 def encodable(values: FloatArray, encoding: int) -> FloatArray:
     """`values` as value encoding `encoding` gives them back; ValueError where they are out of its range."""
     dtype, scale = ENCODINGS[encoding]
     if scale > 1:
-        if not ((values >= 0) & (values <= 1)).all():
+        if values.size and not (values.min() >= 0 and values.max() <= 1):
             raise ValueError(f"found values outside 0..1, expected none for value encoding {encoding}")
-        return frozen(np.rint(values.astype(np.float64) * scale).astype(np.float32) / np.float32(scale), "f4")
+        rounded = np.empty(values.shape, np.float32)
+        for source, target in zip(_pieces(values), _pieces(rounded), strict=True):
+            target[:] = np.rint(source.astype(np.float64) * scale)
+        rounded /= np.float32(scale)
+        rounded.setflags(write=False)
+        return rounded
     return frozen(frozen(values, dtype), np.float32)
 
 

@@ -7,6 +7,7 @@ that an object always equals the one read back.
 
 from __future__ import annotations
 
+import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
@@ -168,7 +169,12 @@ class Record:
         return self is other or self.to_bytes() == other.to_bytes()
 
     def __hash__(self) -> int:
-        return hash((type(self), self.to_bytes()))
+        # Kept, as a table may be large and asked for at every turn; the same in every process, as records
+        # pickle.
+        if "_hash" not in self.__dict__:
+            digest = hashlib.blake2b(self.to_bytes(), digest_size=7).digest()
+            object.__setattr__(self, "_hash", int.from_bytes(digest, "big"))
+        return int(self.__dict__["_hash"])
 
 
 RecordType = TypeVar("RecordType", bound=type[Record])

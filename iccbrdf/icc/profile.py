@@ -19,7 +19,7 @@ from iccbrdf.icc.layout import Record, shown
 from iccbrdf.icc.reader import Reader
 from iccbrdf.icc.tags import TAGS
 
-MAX_BYTES = 1 << 30
+MAX_BYTES = 1 << 28
 MAX_TAGS = 1024
 
 _ENTRY = struct.Struct(">4sII")

@@ -15,13 +15,17 @@ MAX_PARTS = 65_536
 MAX_OPERATIONS = 1 << 18
 """Of all calculator programs of one tag: each takes a hundred times its bytes when it is looked at."""
 
+MAX_NUMBERS = 1 << 26
+"""Of all tables and curves of one tag; each takes four bytes or eight, however small it is stored."""
+
 
 class _Budget:
-    """How many parts and operations one tag has used up so far."""
+    """How many parts, operations and numbers one tag has used up so far."""
 
     def __init__(self) -> None:
         self.spent = 0
         self.operations = 0
+        self.numbers = 0
 
 
 class Reader:
@@ -142,6 +146,12 @@ class Reader:
         self._budget.operations += count
         if self._budget.operations > MAX_OPERATIONS:
             raise LimitError(f"{self.where}: more operations in one tag than the limit of {MAX_OPERATIONS}")
+
+    def count_numbers(self, count: int) -> None:
+        """Account for numbers that are to be converted; LimitError where they are too many."""
+        self._budget.numbers += count
+        if self._budget.numbers > MAX_NUMBERS:
+            raise LimitError(f"{self.where}: more numbers in one tag than the limit of {MAX_NUMBERS}")
 
     def _check_disjoint(self, spans: Sequence[tuple[int, int]], label: Callable[[int], str]) -> None:
         first_index = {span: index for index, span in reversed(list(enumerate(spans)))}

@@ -242,6 +242,7 @@ class _Numbers(FieldType):
         if reader.left % np.dtype(stored).itemsize:
             raise reader.error(f"found {reader.left} bytes, no whole number of {seen['signature']} values")
         numbers = np.frombuffer(reader.take(reader.left, name), stored)
+        reader.count_numbers(numbers.size)
         return numbers / steps if steps > 1 else numbers.astype(memory)
 
     def write(self, out: bytearray, value: npt.NDArray[Any], record: Any) -> None:

@@ -35,7 +35,7 @@ from typing import Any
 from iccbrdf.brdf.primaries import ILLUMINANTS, OBSERVERS
 from iccbrdf.brdf.records import Record
 from iccbrdf.errors import InputError, UsageError
-from iccbrdf.files import StrPath
+from iccbrdf.files import StrPath, read_whole
 
 # Python 3.10 has no reader of TOML.
 if sys.version_info >= (3, 11):
@@ -43,6 +43,8 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+MAX_BYTES = 1 << 20
+"""Of a file of declarations."""
 SCHEMA = "iccbrdf-measurements"
 VERSION = 1
 
@@ -152,10 +154,7 @@ def read_declarations(path: StrPath) -> dict[str, Any]:
         The file cannot be read or is not TOML.
     """
     try:
-        with open(path, encoding="utf-8") as stream:
-            text = stream.read()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+        text = read_whole(path, MAX_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not TOML: {error}") from error
     return _toml(text, str(path))
@@ -208,7 +207,7 @@ def header_declarations(text: str, path: StrPath) -> dict[str, Any]:
 def _toml(text: str, place: str) -> dict[str, Any]:
     try:
         values: dict[str, Any] = tomllib.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{place}: is not TOML: {error}") from error
     return values
 
@@ -217,6 +216,6 @@ def _value(text: str) -> Any:
     """A number or a list, where the text is one."""
     try:
         value = tomllib.loads(f"value = {text}")["value"]
-    except ValueError:
+    except (ValueError, RecursionError):
         return text
     return value if isinstance(value, int | float | list | str) else text

@@ -13,6 +13,7 @@ from typing import Annotated, Any, NamedTuple, get_type_hints
 
 from iccbrdf.build.colour_mid import INTERPOLATIONS
 from iccbrdf.errors import IccBrdfError, InputError, UsageError, nearest
+from iccbrdf.files import read_whole
 from iccbrdf.images.showing import DISPLAYS, HIGHLIGHTS
 from iccbrdf.proof import values as to
 
@@ -20,6 +21,9 @@ if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
+
+MAX_BYTES = 1 << 20
+"""Of a job file."""
 
 
 class Setting(NamedTuple):
@@ -153,10 +157,8 @@ def read_job(path: Path, overriding: Mapping[str, Any] | None = None) -> Job:
         An overriding setting is unknown or has no such value.
     """
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
+        values = tomllib.loads(read_whole(path, MAX_BYTES).decode("utf-8"))
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is not TOML: {error}") from error
     read = _read(values, path.parent, f"{path}: ", InputError)
     return _job({**read, **_read(overriding or {}, Path(), "--", UsageError)}, f"{path}: ", InputError)

@@ -145,7 +145,11 @@ class _Segments(Part):
         text = node.get(name)
         if text.startswith(("-inf", "+inf")):
             return float(text[:4])
-        return float(np.float32(node.value(FLOAT32, text, name)))
+        with np.errstate(over="ignore"):
+            end = float(np.float32(node.value(FLOAT32, text, name)))
+        if not np.isfinite(end):
+            raise node.error(f"{name}: found {text!r}, expected a number that float32 holds, or an infinity")
+        return end
 
     def write(self, out: Target, record: SegmentedCurve) -> None:
         ends = ["-infinity", *(FLOAT32.write(point) for point in record.breakpoints), "+infinity"]

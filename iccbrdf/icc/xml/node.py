@@ -23,6 +23,8 @@ from iccbrdf.icc.xml.values import Codec, Odd
 
 MAX_BYTES = 128 << 20
 """Of an XML file together with all files that it names, and of the XML that is written."""
+MAX_MARKS = 1 << 21
+"""Signs `<` and `=` in a file, of which each element and attribute has one: they take 250 bytes each."""
 MAX_WARNINGS = 20
 MAX_TEXT = 10_000_000
 """Bytes in one piece of text: what libxml2 reads unless it is told to give up its limits."""
@@ -93,6 +95,8 @@ def parse(data: bytes, source: str, document: Document) -> Node:
     """
     if len(data) > MAX_BYTES:
         raise LimitError(f"{source}: larger than the limit of {MAX_BYTES} bytes")
+    if data.count(b"<") + data.count(b"=") > MAX_MARKS:
+        raise LimitError(f"{source}: more elements and attributes than the limit of {MAX_MARKS}")
     parser = etree.XMLParser(
         resolve_entities=False,
         no_network=True,

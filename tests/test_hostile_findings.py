@@ -1,0 +1,149 @@
+"""What fuzzing and looking for trouble have found, each as the smallest change to something sound."""
+
+import io
+import struct
+
+import numpy as np
+import pytest
+import tifffile
+from cmm_examples import device_profile
+from fuzz import seeds
+
+import iccbrdf
+from iccbrdf.brdf import records
+from iccbrdf.brdf.primaries import read_primaries
+from iccbrdf.calc.program import Op
+from iccbrdf.errors import InputError, LimitError, ProfileError
+from iccbrdf.icc import (
+    Calculator,
+    Clut,
+    ExtendedClut,
+    MultiProcess,
+    NumberArray,
+    Profile,
+    describe,
+    reader,
+)
+from iccbrdf.icc.layout import Record
+from iccbrdf.icc.xml import node, profile_from_xml
+from iccbrdf.images import open_tiff
+from iccbrdf.measure import declarations, parse_declarations, read_declarations, read_measurements, tables
+from iccbrdf.proof import job
+from iccbrdf.resources import folder
+
+PRIMARIES = folder("profiles") / "fogra39_gloss" / "primaries.json"
+DEEP = "[" * 5000
+
+
+def test_numbers_of_16_bits_are_described_without_a_warning():
+    profile = device_profile("scnr", meta=NumberArray("fl16", [0.1, 65504.0, -2.0]))
+    assert "[0.099975586, 65504.0, -2.0]" in describe(profile)
+
+
+def a_tiff_that_goes_round():
+    """The directory that follows the first is the first."""
+    file = io.BytesIO()
+    tifffile.imwrite(file, np.zeros((4, 5), np.uint8), photometric="minisblack")
+    data = bytearray(file.getvalue())
+    (first,) = struct.unpack_from("<I", data, 4)
+    (entries,) = struct.unpack_from("<H", data, first)
+    struct.pack_into("<I", data, first + 2 + 12 * entries, first)
+    return data
+
+
+def test_directories_of_a_tiff_that_go_round(tmp_path):
+    """The reading of them never ended."""
+    (tmp_path / "a.tif").write_bytes(a_tiff_that_goes_round())
+    with pytest.raises(LimitError, match=r"a\.tif: more than 64 images in one file"):
+        open_tiff(tmp_path / "a.tif")
+
+
+def test_a_count_of_thousands_of_digits(tmp_path):
+    path = tmp_path / "a.brdf"
+    path.write_text("9" * 5000 + "\n400 500\n")
+    with pytest.raises(InputError, match="expected the number of wavelengths"):
+        read_measurements(path)
+
+
+def test_toml_nested_deeply(tmp_path):
+    """The reader of TOML calls itself for each bracket."""
+    path = tmp_path / "a.toml"
+    path.write_text(f"image = {DEEP}")
+    with pytest.raises(InputError, match="is not TOML"):
+        job.read_job(path)
+    with pytest.raises(InputError, match="is not TOML"):
+        read_declarations(path)
+    assert parse_declarations([f"source={DEEP}"]) == {"source": DEEP}
+    table = tmp_path / "a.csv"
+    table.write_text(f'# schema = "iccbrdf-measurements"\n# version = {DEEP}\npatch,X,Y,Z\np,1,1,1\n')
+    with pytest.raises(InputError, match="is not TOML"):
+        read_measurements(table)
+
+
+def test_ends_of_xml_segments_beyond_float32():
+    (data,) = (xml for xml in seeds.xml() if xml.count(b'Start="0.25"') == 1)
+    with pytest.raises(ProfileError, match="Start: found '1e39', expected a number that float32 holds"):
+        profile_from_xml(data.replace(b'Start="0.25"', b'Start="1e39"'))
+
+
+def test_elements_and_attributes_of_xml_have_a_limit(monkeypatch):
+    (data, *_) = seeds.xml()
+    monkeypatch.setattr(node, "MAX_MARKS", data.count(b"<") + data.count(b"="))
+    profile_from_xml(data)
+    for more in (b"<a/>", b"<!-- = -->"):
+        with pytest.raises(LimitError, match="more elements and attributes than the limit"):
+            profile_from_xml(data.replace(b"<Header>", b"<Header>" + more))
+
+
+def test_files_have_a_size_at_most(tmp_path, monkeypatch):
+    text, toml = tmp_path / "a.csv", tmp_path / "a.toml"
+    text.write_text("patch,X\n" + "p,1\n" * 100)
+    toml.write_text('source = "x"\n')
+    for module, read, path in (
+        (records, read_primaries, PRIMARIES),
+        (tables, read_measurements, text),
+        (declarations, read_declarations, toml),
+        (job, job.read_job, toml),
+    ):
+        monkeypatch.setattr(module, "MAX_BYTES", path.stat().st_size - 1)
+        with pytest.raises(LimitError, match=f"{path.name}: larger than the limit of "):
+            read(path)
+
+
+def test_numbers_of_a_tag_have_a_limit(monkeypatch):
+    """A byte of a table takes four in memory."""
+    elements = [ExtendedClut(np.zeros((5, 5, 5, 3), np.float32), 3) for _ in range(3)]
+    data = device_profile("scnr", A2B0=MultiProcess.of(*elements)).to_bytes()
+    monkeypatch.setattr(reader, "MAX_NUMBERS", 3 * 375)
+    Profile.from_bytes(data)["A2B0"]
+    monkeypatch.setattr(reader, "MAX_NUMBERS", 3 * 375 - 1)
+    with pytest.raises(LimitError, match="more numbers in one tag than the limit of 1124"):
+        Profile.from_bytes(data)["A2B0"]
+
+
+@pytest.mark.parametrize("encoding", range(4))
+def test_tables_are_stored_as_before_piece_by_piece(encoding, monkeypatch):
+    from iccbrdf.icc import fields
+
+    table = np.random.default_rng(encoding).random((6, 5, 4, 3)).astype(np.float32)
+    whole = ExtendedClut(table, encoding)
+    monkeypatch.setattr(fields, "_PIECE", 7)
+    assert ExtendedClut(table, encoding).to_bytes() == whole.to_bytes()
+    scale = (1, 1, 65535, 255)[encoding]
+    if scale > 1:
+        expected = np.rint(table.astype(np.float64) * scale) / scale
+        np.testing.assert_allclose(whole.table, expected, rtol=1e-6)
+
+
+def test_a_table_that_is_applied_many_times_is_looked_at_few(monkeypatch):
+    """Each application compared its bytes with those of all others."""
+    made = []
+    to_bytes = Record.to_bytes
+    monkeypatch.setattr(Record, "to_bytes", lambda self: made.append(self) or to_bytes(self))
+    table = np.random.default_rng(0).random((3, 3, 3, 3)).astype(np.float32)
+    operations = [Op("in", 2), *(Op("clut", (i % 2) << 16) for i in range(300)), Op("out", 2)]
+    element = Calculator(3, 3, tuple(operations), (Clut(table), Clut(table.copy())))
+    transform = iccbrdf.link([device_profile("scnr", A2B0=MultiProcess.of(element))], backend="numpy")
+    for _ in range(3):
+        transform([[0.5, 0.5, 0.5]])
+    assert sum(isinstance(record, Clut) for record in made) <= 8
