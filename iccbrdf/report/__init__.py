@@ -1,4 +1,4 @@
-"""Evaluation of fits, interpolation and slope adjustment as the papers do it.
+"""Evaluation of fits, interpolation and slope adjustment as the papers do it; what accuracy costs in time.
 
 print_data   the measurements that an evaluation needs, read and checked
 appearance   one set of patches, measured and computed, and the differences between them
@@ -7,6 +7,11 @@ papers       the papers' own figures
 tables       the experiments as tables, the papers' figures beside ours
 orderings    which of two methods is better, here and in the papers
 plots        the experiments as pictures
+cost_ways    the ways to one proof
+cost_scene   the pixels that they are compared on, and what is exact for them
+cost_runs    ways made ready to run
+cost         their times and errors, and which of them to take
+cost_tables, cost_plots   these as tables and as pictures
 
 References
 ----------
