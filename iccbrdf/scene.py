@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
 
@@ -26,6 +26,15 @@ def environment(light: str | None, view: str | None, env: Iterable[str]) -> dict
             raise UsageError(f"--env {item!r}: expected NAME=VALUE")
         values[name] = parse_number("--env " + name, value)
     return values
+
+
+def that_are_read(values: Mapping[str, float], variables: Collection[str]) -> dict[str, float]:
+    """Light and view, less the one that makes no difference to profiles that read the other.
+
+    `variables` are those that the profiles read: without gloss, a view changes nothing.
+    """
+    reflects = any(name in variables for name in LIGHT + VIEW)
+    return {name: value for name, value in values.items() if name in variables or not reflects}
 
 
 def parse_direction(option: str, text: str) -> tuple[float, float, float]:

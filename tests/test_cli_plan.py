@@ -194,3 +194,19 @@ def test_an_image_of_another_kind(run, tmp_path):
     result = run("plan", tmp_path / "grey.tif", "--primaries", PRIMARIES)
     assert result.code == 3
     assert "'grey'" in result.err
+
+
+def test_a_view_makes_no_difference_to_profiles_without_gloss(tmp_path, run):
+    """Profiles that were reduced to diffuse reflection are applied as any: with light and view."""
+    primaries = folder("profiles") / "fogra39_gloss" / "primaries.json"
+    image = tmp_path / "image.tif"
+    with create_tiff(image, 2, 3, [*"XYZ", "n.x", "n.y", "n.z"], samples="device") as sink:
+        sink.write(Block(0, 0, np.full((2, 3, 6), 0.4, np.float32)))
+    assert run("build", primaries, "-o", tmp_path / "matte", "--without", "specular,below-horizon").code == 0
+    chain = ["-p", tmp_path / "matte" / "colour-mid.icc", "-p", tmp_path / "matte" / "mvis.icc"]
+    light = ["--light", "30,0"]
+    assert run("apply", image, *chain, "-o", tmp_path / "a.tif", *light).code == 0
+    assert run("apply", image, *chain, "-o", tmp_path / "b.tif", *light, "--view", "40,90").code == 0
+    assert (tmp_path / "a.tif").read_bytes() == (tmp_path / "b.tif").read_bytes()
+    refused = run("apply", image, *chain, "-o", tmp_path / "c.tif", "--env", "vueX=0.1")
+    assert refused.code == 2

@@ -33,6 +33,7 @@ from iccbrdf.icc import read_profile
 from iccbrdf.images import ImageSource, Samples, WithNormals, processors
 from iccbrdf.images.blocks import Array
 from iccbrdf.images.checks import NonFinite
+from iccbrdf.scene import that_are_read
 
 MOST_WORKERS = 8
 """Unless more are asked for: reading and writing keep no more busy, and each takes memory."""
@@ -188,7 +189,7 @@ def command(
         Output(path, dtype, embedded, packing, exposure, 16 if depth == "16" else 8) for path in outputs
     ]
     check_outputs(targets, overwrite=force)
-    variables = environment(light, view, env)
+    scene, own_variables = environment(light, view, ()), environment(None, None, env)
     if cluster is not None and (normal_map or height_map):
         raise UsageError("a cluster reads one image: leave --normals and --height out, or --cluster")
     if cluster is not None and image.suffix.lower() == EXR_SUFFIX:
@@ -203,7 +204,6 @@ def command(
                 raise UsageError(f"name the image's {opened.channels} channels with --channels")
             source, declared = WithNormals(opened, own, normals), None
         settings: dict[str, Any] = {
-            "env": variables,
             "intent": intent,
             "dtype": "float64" if double else "float32",
             "samples": source.samples,
@@ -213,6 +213,8 @@ def command(
             "max_cost": max_cost,
         }
         transform = link(chain, **settings)
+        settings["env"] = that_are_read(scene, transform.variables) | own_variables
+        transform = transform.with_env(settings["env"])
         names = arranged_channels(source, transform.channels_in, declared)
         if names is not None:
             transform = link(chain, channels=names, **settings)
