@@ -176,7 +176,8 @@ def write_fit_costs(folder: Path) -> None:
     lines = [
         "# What fitting costs",
         "",
-        f"Made by `tools/make_cost.py --fit` on {machine()}: BRDF1 fitted to the primaries of a simulated print (seed 0), "
+        f"Made by `tools/make_cost.py --fit` on {machine()}: "
+        "BRDF1 fitted to the primaries of a simulated print (seed 0), "
         "by the root mean square CIEDE2000 over some or all of the geometries.",
         "",
         "| solver | starts | geometries | ms a patch | rms CIEDE2000, fitted readings | all readings |",
