@@ -58,10 +58,36 @@ def test_directories_of_a_tiff_that_go_round(tmp_path):
         open_tiff(tmp_path / "a.tif")
 
 
+@pytest.mark.parametrize("tag", [256, 257, 278])
+def test_a_tiff_whose_size_is_a_fraction(tmp_path, tag):
+    """Width, height or rows of a strip as a double."""
+    data = a_tiff_that_goes_round()
+    (first,) = struct.unpack_from("<I", data, 4)
+    (entries,) = struct.unpack_from("<H", data, first)
+    struct.pack_into("<I", data, first + 2 + 12 * entries, 0)
+    places = range(first + 2, first + 2 + 12 * entries, 12)
+    (place,) = (at for at in places if struct.unpack_from("<H", data, at) == (tag,))
+    struct.pack_into("<HHII", data, place, tag, 12, 1, len(data))
+    (tmp_path / "a.tif").write_bytes(data + struct.pack("<d", 2.5))
+    with pytest.raises(InputError, match=r"a\.tif: (damaged|not a readable) TIFF"):
+        open_tiff(tmp_path / "a.tif")
+
+
 def test_a_count_of_thousands_of_digits(tmp_path):
     path = tmp_path / "a.brdf"
     path.write_text("9" * 5000 + "\n400 500\n")
     with pytest.raises(InputError, match="expected the number of wavelengths"):
+        read_measurements(path)
+
+
+def test_patch_names_with_blanks_that_nobody_sees(tmp_path):
+    """Such a name was refused as if the call were wrong, not the file."""
+    kind, _, text = seeds.tables()[0].partition(b"\n")
+    path = tmp_path / f"a.{kind.decode()}"
+    path.write_bytes(text.replace(b"paper,", "paper\u00a0 \x1c,".encode()))
+    assert read_measurements(path).patches == ("paper", "cyan")
+    path.write_bytes(text.replace(b"paper,", "\u00a0,".encode()))
+    with pytest.raises(InputError, match="the name of the patch is empty"):
         read_measurements(path)
 
 

@@ -80,7 +80,8 @@ class TiffStorage:
     def _parse(self) -> None:
         path = self._path
         page = self._page = _only_image(self._file, path, self._photometrics)
-        self._planes, _, self.height, self.width, contiguous = page.shaped
+        # A damaged file may have fractions here and below, which index refuses.
+        self._planes, _, self.height, self.width, contiguous = map(index, page.shaped)
         self.channels: int = self._planes * contiguous
         if self.channels > MAX_CHANNELS:
             raise LimitError(f"{path}: {self.channels} channels, the limit is {MAX_CHANNELS}")
@@ -97,12 +98,12 @@ class TiffStorage:
         self.ink_set: int = page.tags.valueof(332, 1)
         self._pixel_bytes = contiguous * self.dtype.itemsize
         if page.is_tiled:
-            self._grid = Grid(self.height, self.width, page.tilelength, page.tilewidth)
+            self._grid = Grid(self.height, self.width, index(page.tilelength), index(page.tilewidth))
         else:
-            self._grid = Grid(self.height, self.width, min(page.rowsperstrip, self.height), self.width)
+            strip = min(index(page.rowsperstrip), self.height)
+            self._grid = Grid(self.height, self.width, strip, self.width)
         self._in_place = page.compression == 1 and page.predictor == 1 and page.fillorder == 1
         self.unit = (1, 1) if self._in_place else (self._grid.segment_height, self._grid.segment_width)
-        # A damaged file may have fractions here, which index refuses.
         self._offsets = [index(offset) for offset in page.dataoffsets]
         self._counts = [index(count) for count in page.databytecounts]
         self._check_segments()

@@ -206,7 +206,8 @@ def _arrange(table: Table, columns: Columns, theta_i: Array, theta_r: Array, phi
     if "slope" in columns:
         slopes = columns.numbers("slope")[:, 0]
         _check(table, "slope", slopes, (slopes >= 0) & (slopes <= 90), "0 to 90")
-    names = columns.texts("patch")
+    # Blanks of any kind that nobody sees tell no patches apart.
+    names = [" ".join(name.split()) for name in columns.texts("patch")]
     if "" in names:
         raise InputError(f"{table.row(names.index(''))}: the name of the patch is empty")
     patches: dict[tuple[str, float], int] = {}
