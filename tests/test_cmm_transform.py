@@ -310,3 +310,12 @@ def damage(draw, data):
         value = draw.choice([0, 1, 2, 255, 2**15, draw.getrandbits(32)])
         data[at : at + size] = (value % 256**size).to_bytes(size, "big")
     return bytes(data)
+
+
+def test_compiled_code_is_kept_under_another_light_and_left_out_of_pickles(pair):
+    transform = iccbrdf.link(pair)
+    execution = transform.execution
+    assert transform.with_env({"litX": 0.2}).execution is execution
+    again = pickle.loads(pickle.dumps(transform))
+    assert "execution" not in again.__dict__
+    assert again == transform

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -49,13 +50,17 @@ class Transform:
     max_cost: float = MAX_COST
     """What `cost` may be at most."""
 
-    @property
+    @cached_property
     def execution(self) -> Execution:
         """What runs the chain, compiled when first asked for."""
         dtype = np.dtype(self.dtype)
         if self.adaptive:
             return adaptive_execution(self.steps, self.channels_in, dtype, self.wanted)
         return execution(self.steps, len(self.channels_in), dtype, self.wanted)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but compiled code, which another process makes for itself."""
+        return {name: value for name, value in self.__dict__.items() if name != "execution"}
 
     @property
     def backend(self) -> str:
@@ -119,4 +124,8 @@ class Transform:
 
     def with_env(self, env: Mapping[str, float]) -> Transform:
         """The same chain under other run-time variables; those not named keep their value."""
-        return replace(self, env={**self.env, **checked_environment(env, self.variables)})
+        changed = replace(self, env={**self.env, **checked_environment(env, self.variables)})
+        if "execution" in self.__dict__:
+            # Compiled code takes variables as arguments.
+            changed.__dict__["execution"] = self.execution
+        return changed
