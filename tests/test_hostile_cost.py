@@ -3,6 +3,7 @@
 import struct
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -101,7 +102,7 @@ def test_one_element_in_many_places_is_added_up():
 
 def test_what_would_take_days_is_refused():
     transform = link([scanner(doubled(20))])
-    assert transform.cost(1) > 2**23
+    assert transform.cost(1) == transform.cost(1000) > 1000 * 2**23
     # As if there were 200 million pixels.
     pixels = np.broadcast_to(np.float32(0.5), (200_000_000, 3))
     with pytest.raises(LimitError, match=r"200000000 pixels take .* the limit is 1e\+14; .*max_cost"):
@@ -113,16 +114,16 @@ def test_honest_work_is_not():
 
     here = folder("profiles") / "fogra39_gloss"
     transform = link([here / "colour-mid.icc", here / "mvis.icc"])
-    assert 300 < transform.cost(1) < 2000
+    assert 300_000 < transform.cost(1000) < 2_000_000
     transform.check_cost(50_000_000_000)
 
 
 def test_the_limit_is_the_users():
     profile = scanner(calculator(THREE))
-    transform = link([profile], max_cost=400)
-    assert transform(np.zeros((100, 3))).shape == (100, 3)
+    transform = link([profile], max_cost=8000)
+    assert transform(np.zeros((2000, 3))).shape == (2000, 3)
     with pytest.raises(LimitError):
-        transform(np.zeros((101, 3)))
+        transform(np.zeros((2001, 3)))
     assert link([profile]).max_cost == MAX_COST
     for wrong in (0, -1, np.nan, "much", None):
         with pytest.raises(UsageError, match="max_cost"):
@@ -208,25 +209,25 @@ WORST = {
 }
 """Programs that are as long as graphs may be, and one of many operations."""
 
+# The most memory that the process itself held: what getrusage tells starts at its parent's.
 _LINK = """
-import resource, sys, time
+import sys
+from pathlib import Path
 import iccbrdf
-begun = time.process_time()
 transform = iccbrdf.link([sys.argv[1]])
 transform([[0.5, 0.5, 0.5]])
-print(time.process_time() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+status = open("/proc/self/status").read()
+print(int(status.split("VmHWM:")[1].split()[0]) / 1024)
 """
 
 
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read from /proc")
 @pytest.mark.parametrize("name", WORST)
-def test_the_worst_that_is_accepted_links_within_seconds(tmp_path, name):
+def test_the_worst_that_is_accepted_links_in_little_memory(tmp_path, name):
     inner = Calculator(1, 1, WORST[name])
     outer = calculator("in(0) calc(0) copy(1,2) out(0,3)", [inner])
     write_profile(scanner(outer), tmp_path / "a.icc")
     out = subprocess.run(
         [sys.executable, "-c", _LINK, tmp_path / "a.icc"], capture_output=True, text=True, check=True
     ).stdout
-    seconds, megabytes = map(float, out.split())
-    # Processor time; the machine may be slow.
-    assert seconds < 30
-    assert megabytes < 500
+    assert float(out) < 500
