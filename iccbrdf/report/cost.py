@@ -25,7 +25,7 @@ from iccbrdf.cmm import link
 from iccbrdf.errors import UnsupportedError, UsageError
 from iccbrdf.images.showing import finite
 from iccbrdf.planning import Planning, ScenePlan
-from iccbrdf.report.cost_runs import Ready, held, make_ready
+from iccbrdf.report.cost_runs import Ready, make_ready
 from iccbrdf.report.cost_scene import PIXELS, REGIONS, CostScene, Tiles, sample_scene
 from iccbrdf.report.cost_ways import PLAIN, Way, ways
 
@@ -341,7 +341,7 @@ def _backends(scene: CostScene, exact: Array, names: Sequence[str], runs: int) -
             run = link(profiles, env=scene.env, channels=scene.names, samples=scene.samples, backend=name)
         except UnsupportedError:
             continue
-        works[name] = partial(held(run), tiles)
+        works[name] = partial(run, tiles)
     found = {name: work() for name, work in works.items()}
     times = _in_turns(list(works.values()), runs)
     return tuple(

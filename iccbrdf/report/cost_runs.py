@@ -19,7 +19,7 @@ from iccbrdf.build.slope_adjustment import slope_adjustment
 from iccbrdf.build.table import build_table_mid, build_table_profile
 from iccbrdf.build.viewing import viewing
 from iccbrdf.calc import verify
-from iccbrdf.cmm import Transform, link, standard_XYZ
+from iccbrdf.cmm import link, standard_XYZ
 from iccbrdf.cmm.luts import as_elements
 from iccbrdf.cmm.spaces import Space
 from iccbrdf.icc import ColorantTable, Header, Matrix, MultiProcess, Profile
@@ -71,23 +71,6 @@ def make_ready(way: Way, scene: CostScene, plan: Callable[[float], ScenePlan]) -
     return _linked(way, scene, plan)
 
 
-def held(transform: Transform) -> Callable[[Tiles], Stored]:
-    """What runs a transform on arrays (..., channels), compiled once.
-
-    A transform alone leaves its compiled chain to a cache, which so many ways as are compared here overflow.
-    """
-    run, channels = transform.execution.bind(transform.env), len(transform.channels_out)
-
-    def held_run(tiles: Tiles) -> Stored:
-        flat = tiles.reshape(-1, tiles.shape[-1])
-        out: Stored = np.empty((len(flat), channels), transform.dtype)
-        with np.errstate(all="ignore"):
-            run(flat, out)
-        return out.reshape(*tiles.shape[:-1], channels)
-
-    return held_run
-
-
 def _linked(way: Way, scene: CostScene, plan: Callable[[float], ScenePlan]) -> Ready:
     """A chain of profiles that takes the image as it is."""
     recipe, names, bound = scene.recipe, scene.names, None
@@ -121,7 +104,7 @@ def _linked(way: Way, scene: CostScene, plan: Callable[[float], ScenePlan]) -> R
     )
     in_order = columns == list(range(len(scene.names)))
     return Ready(
-        held(transform),
+        transform,
         (mid, mvis),
         transform.backend,
         operators([mid, mvis]),
@@ -139,11 +122,11 @@ def _by_version_4(way: Way, scene: CostScene) -> Ready:
     parameters = MODELS[recipe.primaries.model].channels
     table = build_table_profile(recipe.primaries, method=_method(scene), grid=way.grid or 0)[0]
     mid = _version_4_mid(scene, table)
-    look_up = held(link([mid], channels=names, samples=scene.samples))
+    look_up = link([mid], channels=names, samples=scene.samples)
     rest = [i for i, name in enumerate(names) if name in NORMAL]
     channels = [*parameters, *(names[i] for i in rest)]
     transform = link([pair.mid, pair.mvis], env=_known(scene, pair.mvis), channels=channels)
-    finish = held(transform)
+    finish = transform
 
     def run(tiles: Tiles) -> Stored:
         image = np.rint(np.clip(look_up(tiles), 0, 1) * np.float32(_LARGEST_U16)).astype(np.uint16)
@@ -177,10 +160,10 @@ def _reduced(way: Way, scene: CostScene) -> Ready:
     names, pair, mid = scene.names, scene.pair, scene.mid
     to_parameters = link([mid], channels=names, samples=scene.samples)
     channels = to_parameters.channels_out
-    reflect = held(link([pair.mvis], env=_known(scene, pair.mvis), channels=channels))
+    reflect = link([pair.mvis], env=_known(scene, pair.mvis), channels=channels)
     own = [(channels.index(name), names.index(name)) for name in NORMAL if name in names]
     kept = [j for j, name in enumerate(channels) if name not in NORMAL or name not in names]
-    decode = held(to_parameters)
+    decode = to_parameters
 
     def run(tiles: Tiles) -> Stored:
         few = decode(shrunk(tiles, way.reduction))
@@ -234,7 +217,7 @@ def _stored(way: Way, scene: CostScene, ready: Ready) -> Ready:
     primaries = scene.recipe.primaries
     back = viewing(primaries.illuminant, primaries.observer, primaries.white).from_standard()
     to_own = back.elements[0].matrix.astype(np.float64)
-    to_display, showing = held(standard_XYZ(ready.profiles[-1])), Showing(srgb())
+    to_display, showing = standard_XYZ(ready.profiles[-1]), Showing(srgb())
     dtype = np.dtype(np.uint8 if way.output == "8-bit sRGB" else np.uint16)
     largest = np.iinfo(dtype).max
 
