@@ -8,6 +8,7 @@ import pytest
 import tifffile
 from cmm_examples import device_profile
 from fuzz import seeds
+from fuzz.watch import time_limit
 
 import iccbrdf
 from iccbrdf.brdf import records
@@ -37,7 +38,9 @@ DEEP = "[" * 5000
 
 def test_numbers_of_16_bits_are_described_without_a_warning():
     profile = device_profile("scnr", meta=NumberArray("fl16", [0.1, 65504.0, -2.0]))
-    assert "[0.099975586, 65504.0, -2.0]" in describe(profile)
+    for options in ({}, {"legacy": "1.13"}):
+        with np.printoptions(**options):
+            assert "[0.099975586, 65504.0, -2.0]" in describe(profile)
 
 
 def a_tiff_that_goes_round():
@@ -173,3 +176,20 @@ def test_a_table_that_is_applied_many_times_is_looked_at_few(monkeypatch):
     for _ in range(3):
         transform([[0.5, 0.5, 0.5]])
     assert sum(isinstance(record, Clut) for record in made) <= 8
+
+
+def test_what_took_the_square_of_its_size(tmp_path):
+    """Tables of ten thousands of columns, and keys of ten thousands of parts."""
+    names = ",".join(f"c{i}" for i in range(20_000))
+    wide, keys, header = tmp_path / "wide.csv", tmp_path / "keys.toml", tmp_path / "header.csv"
+    wide.write_text(names + "\n" + ",".join(["1"] * 20_000))
+    keys.write_text("a." * 40_000 + "b = 1")
+    header.write_text('# schema = "iccbrdf-measurements"\n# ' + "a." * 40_000 + "b = 1\npatch,X\np,1\n")
+    with time_limit(5), pytest.raises(InputError):
+        read_measurements(wide)
+    for read, path in ((job.read_job, keys), (read_declarations, keys), (read_measurements, header)):
+        with pytest.raises(LimitError, match="larger than the limit of 65536"):
+            read(path)
+    wide.write_text(f"a,{names},a,c7\n" + ",".join(["1"] * 20_003))
+    with pytest.raises(InputError, match="the column 'a' stands twice"):
+        read_measurements(wide)

@@ -20,7 +20,7 @@ MAX_CALCULATORS = 32
 """Calculators inside calculators."""
 MAX_EXECUTED = 1 << 24
 """Operations for one pixel: calculators that apply others twice could ask for 2^32 from a small file."""
-MAX_WORK = 1 << 26
+MAX_WORK = 1 << 25
 """The same of numbers: one operation may add up 65,535."""
 MAX_SAMPLES = 1 << 20
 """Samples of a calculator curve, whose stored size may be anything."""

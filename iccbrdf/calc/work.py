@@ -13,7 +13,7 @@ from iccbrdf.calc.program import Op
 
 TILE = 1 << 14
 """Pixels that share what is done once a tile."""
-_BRANCH = 64
+_BRANCH = 16
 """Values that an interpreter carries into and out of a branch with the effort of one operator."""
 _APPEARANCE = 100
 """Operators of the appearance model's transforms, about."""

@@ -21,6 +21,8 @@ from iccbrdf.errors import InputError, LimitError
 MAX_COST = 1e14
 """Operators on single numbers for all pixels together, unless the caller allows more: a day on one processor.
 The longest program of ours runs within it on a hundred gigapixels."""
+LEAST_PIXELS = 1000
+"""An operator takes as long to begin as it then takes for so many pixels."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +70,12 @@ class Transform:
         return self.execution.backend
 
     def cost(self, pixels: int) -> int:
-        """Operators on single numbers that so many pixels take at most, those of elements included."""
-        return pixels * sum(step.work if isinstance(step, Process) else 1 for step in self.steps)
+        """Operators on single numbers that so many pixels take at most, those of elements included.
+
+        Few pixels take as long as LEAST_PIXELS.
+        """
+        work = sum(step.work if isinstance(step, Process) else 1 for step in self.steps)
+        return max(pixels, LEAST_PIXELS) * work
 
     def check_cost(self, pixels: int) -> None:
         """LimitError where so many pixels, of an array or of a whole image, cost more than `max_cost`."""

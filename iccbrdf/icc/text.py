@@ -102,8 +102,10 @@ def _number(value: Any) -> Any:
         return int(value)
     if math.isfinite(value):
         exact = float(value)
-        single = np.float32(exact) if abs(exact) < 1e38 else exact
-        return float(str(single if single == exact else exact))
+        if abs(exact) < 1e38 and np.float32(exact) == exact:
+            # Not str: its digits are a setting of the process, which other packages change.
+            return float(np.format_float_scientific(np.float32(exact)))
+        return exact
     return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
 
 

@@ -34,7 +34,7 @@ from typing import Any
 
 from iccbrdf.brdf.primaries import ILLUMINANTS, OBSERVERS
 from iccbrdf.brdf.records import Record
-from iccbrdf.errors import InputError, UsageError
+from iccbrdf.errors import InputError, LimitError, UsageError
 from iccbrdf.files import StrPath, read_whole
 
 # Python 3.10 has no reader of TOML.
@@ -43,8 +43,8 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-MAX_BYTES = 1 << 20
-"""Of a file of declarations."""
+MAX_BYTES = 1 << 16
+"""Of declarations, in a file or at the head of a table: the reading of TOML may take their square."""
 SCHEMA = "iccbrdf-measurements"
 VERSION = 1
 
@@ -152,6 +152,8 @@ def read_declarations(path: StrPath) -> dict[str, Any]:
     ------
     InputError
         The file cannot be read or is not TOML.
+    LimitError
+        The file is larger than MAX_BYTES.
     """
     try:
         text = read_whole(path, MAX_BYTES).decode("utf-8")
@@ -196,6 +198,8 @@ def header_declarations(text: str, path: StrPath) -> dict[str, Any]:
     ------
     InputError
         It is not TOML, or of another schema or version.
+    LimitError
+        It is larger than MAX_BYTES.
     """
     header = Record(str(path), "header", _toml(text, f"{path}: header"))
     header.choice("schema", [SCHEMA])
@@ -205,6 +209,8 @@ def header_declarations(text: str, path: StrPath) -> dict[str, Any]:
 
 
 def _toml(text: str, place: str) -> dict[str, Any]:
+    if len(text) > MAX_BYTES:
+        raise LimitError(f"{place}: larger than the limit of {MAX_BYTES} bytes")
     try:
         values: dict[str, Any] = tomllib.loads(text)
     except (ValueError, RecursionError) as error:

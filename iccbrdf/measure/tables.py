@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -225,9 +226,9 @@ def _table(
 ) -> Table:
     if not names or not rows:
         raise InputError(f"{path}: holds no {'rows' if names else 'columns'}, expected a table")
-    for k, name in enumerate(names):
-        if name in names[:k]:
-            raise InputError(f"{path}: the column {name!r} stands twice, expected different names")
+    if len(set(names)) < len(names):
+        twice = next(name for name, count in Counter(names).items() if count > 1)
+        raise InputError(f"{path}: the column {twice!r} stands twice, expected different names")
     for row, number in zip(rows, numbers, strict=True):
         if len(row) != len(names):
             raise InputError(f"{path}: line {number}: found {len(row)} fields, expected {len(names)}")

@@ -22,8 +22,8 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-MAX_BYTES = 1 << 20
-"""Of a job file."""
+MAX_BYTES = 1 << 16
+"""Of a job file: the reading of TOML may take its square."""
 
 
 class Setting(NamedTuple):
@@ -153,6 +153,8 @@ def read_job(path: Path, overriding: Mapping[str, Any] | None = None) -> Job:
     ------
     InputError
         The file cannot be read or is not TOML; or a key is unknown, missing or has no such value.
+    LimitError
+        The file is larger than MAX_BYTES.
     UsageError
         An overriding setting is unknown or has no such value.
     """

@@ -53,7 +53,7 @@ OF_FILES = (InputError, UnsupportedError, LimitError)
 """Those of a user's other files."""
 
 MAX_COST = 1e9
-"""Of a transform that is run here: a few seconds."""
+"""Of a transform that is run here: seconds."""
 _ODD = [0.0, 1.0, 0.5, -1.0, 2.0, 1e30, np.inf, -np.inf, np.nan]
 
 

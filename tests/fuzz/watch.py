@@ -17,8 +17,8 @@ from fuzz.targets import Target, quietly
 
 MAX_SECONDS = 10
 """Processor time that an input may take."""
-MAX_MEMORY = 1 << 30
-"""Bytes by which an input may raise the most that the process has held."""
+MAX_MEMORY = 3 << 29
+"""Bytes by which an input may raise the most that the process has held (see SECURITY.md)."""
 
 
 class TooSlow(BaseException):
