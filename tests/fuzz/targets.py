@@ -146,7 +146,8 @@ def program(data: bytes) -> bool:
         return False
     process = MultiProcess.of(Calculator(3, 3, operations, elements))
     header = Header(device_class="scnr", colour_space="RGB ", pcs="XYZ ")
-    return run_chain(Profile(header, {"A2B0": process}), "numpy", "interpreter")
+    # The quickest back end first, which makes machine code.
+    return run_chain(Profile(header, {"A2B0": process}), "auto", "numpy", "interpreter")
 
 
 # Files of users ------------------------------------------------------------------------------------------
