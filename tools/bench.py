@@ -35,7 +35,7 @@ from iccbrdf.brdf.primaries import read_primaries
 from iccbrdf.build import build_colour_mid, build_pair
 from iccbrdf.build.profiles import XYZ_RANGE, text_tags
 from iccbrdf.calc import parse, verify
-from iccbrdf.icc import Calculator, Header, MultiProcess, Profile
+from iccbrdf.icc import Calculator, Header, Matrix, MultiProcess, Profile
 from iccbrdf.resources import folder
 
 Array = NDArray[Any]
@@ -114,6 +114,14 @@ def reference(profiles: Sequence[Profile], place: Path) -> iccdev.IccCmm:
         cmm.attach(path, intent=1, lut_type=iccdev.LutType.MCS)
     cmm.begin()
     return cmm
+
+
+def identity(names: Sequence[str]) -> Profile:
+    """A MID that changes nothing, without which the reference runs no MVIS."""
+    n = len(names)
+    header = Header(device_class="mid ", colour_space=f"nc{n:04x}", mcs=f"mc{n:04x}")
+    process = MultiProcess(n, n, (Matrix.of(np.eye(n)),))
+    return Profile(header, {**text_tags("identity", names), "A2M0": process})
 
 
 def program_profile(operators: int) -> Profile:
@@ -282,11 +290,12 @@ def program_growth(place: Path) -> dict[str, list[float]]:
         profile = program_profile(size)
         program = profile["M2B0"].elements[0].program
         growth["operators"].append(verify(program, 3, 3).executed)
-        cmm = reference([profile], place)
+        chain = [identity(("a", "b", "c")), profile]
+        cmm = reference(chain, place)
         transforms = {}
         for backend in ("numpy", "llvm"):
             start = time.perf_counter()
-            transforms[backend] = iccbrdf.link([profile], backend=backend)
+            transforms[backend] = iccbrdf.link(chain, backend=backend)
             growth.setdefault(f"{backend}, ms to compile", []).append(1e3 * (time.perf_counter() - start))
         few = pixels[: FEW // 16]
         seconds = in_turns({name: partial(transform, pixels) for name, transform in transforms.items()})
@@ -312,7 +321,8 @@ def reference_cost(place: Path) -> list[dict[str, Any]]:
             if e.signature == "calc"
         )
         pixels = np.random.default_rng(0).random((FEW // 8, process.inputs)).astype(np.float32)
-        cmm = reference([profile], place)
+        is_mid = tag == "A2M0"
+        cmm = reference([profile] if is_mid else [identity(profile["mcta"].texts()), profile], place)
         seconds = in_turns({"": partial(cmm.apply_ndarray, pixels)}, 5)[""]
         lines.append(
             {
