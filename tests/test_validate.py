@@ -252,7 +252,7 @@ def test_what_is_no_profile_has_one_finding(data):
 
 
 def test_large_programs():
-    """Many operations read thousands of temporaries, more open blocks: work in proportion, and one finding."""
+    """Many operations read thousands of temporaries, more open blocks: work in proportion, one finding."""
     read = [Op("tget", 0xFFE), Op("pop", 0xFFE << 16)] * 1_000
     blocks = [Op("data"), Op("if", 0)] * 5_000
     ops = (*read, *blocks, *parse("in(0,2) 0 out(0,3)"))
