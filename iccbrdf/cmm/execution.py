@@ -23,6 +23,9 @@ BACKENDS = ("auto", "interpreter", *COMPILERS)
 
 TILE = 16384
 """Pixels a tile: the registers of a Cook-Torrance program on float32 tiles of this size stay within L2."""
+LEAST_PIECE = 1 << 19
+"""Pixels of a thread's piece, where there are enough: handing over a small one takes longer than it may even
+out."""
 MAX_VALUES = 1 << 24
 """Values of a tile at a time: programs may ask for so many registers that fewer pixels must do."""
 
@@ -199,7 +202,8 @@ def all_finite(tile: Array) -> bool:
 
 
 def parts(count: int, threads: int) -> Sequence[slice]:
-    """`count` pixels in pieces of whole tiles for so many threads, a few for each to even out."""
-    tiles = -(-count // TILE)
-    size = TILE * max(1, -(-tiles // (4 * threads)))
+    """`count` pixels in pieces of whole tiles: as many as there are threads, or more that are large."""
+    least = -(-count // threads)
+    size = max(min(least, LEAST_PIECE), -(-count // (4 * threads)), 1)
+    size = -(-size // TILE) * TILE
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -16,6 +15,7 @@ from iccbrdf.cmm.adaptive import adaptive_execution
 from iccbrdf.cmm.environment import checked_environment
 from iccbrdf.cmm.execution import Execution, Tally, execution, parts
 from iccbrdf.cmm.steps import Process, Step
+from iccbrdf.cmm.threads import spread
 from iccbrdf.errors import InputError, LimitError
 
 MAX_COST = 1e14
@@ -120,12 +120,7 @@ class Transform:
             with np.errstate(all="ignore"):
                 return run(flat[piece], out[piece])
 
-        pieces = parts(len(flat), self.threads)
-        if self.threads > 1 and len(pieces) > 1:
-            with ThreadPoolExecutor(self.threads) as pool:
-                tally = sum(pool.map(quietly, pieces), start=Counter[str]())
-        else:
-            tally = quietly(slice(None))
+        tally = sum(spread(quietly, parts(len(flat), self.threads), self.threads), start=Counter[str]())
         return out.reshape(*pixels.shape[:-1], len(self.channels_out)), tally
 
     def with_env(self, env: Mapping[str, float]) -> Transform:
