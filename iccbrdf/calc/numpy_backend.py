@@ -43,6 +43,7 @@ class NumpyKernel:
         self._code = _bound(steps, self._layout)
         self.tile = min(TILE, max(1, MAX_VALUES // max(1, self.registers)))
         self._idle: list[_Planes] = []
+        self._last: tuple[Sequence[np.generic], Frame] = ([], [])
 
     @property
     def registers(self) -> int:
@@ -60,26 +61,29 @@ class NumpyKernel:
         out
             (n, outputs) of the graph's type, of any strides; not the same memory as `pixels`.
         arguments
-            The values of the schedule's arguments (calc/schedule.py, uniform_values).
+            The values of the schedule's arguments (calc/schedule.py, uniform_values); not changed afterwards.
         """
         try:
             # Lists give and take single items atomically.
             planes = self._idle.pop()
         except IndexError:
             planes = _Planes(self._layout, self._dtype, self.tile)
-        size = -1
+        uniform = self._uniform(arguments)
         with np.errstate(all="ignore"):
-            uniform = self._layout.uniform(arguments, self._dtype)
             for start in range(0, len(pixels), self.tile):
                 part = slice(start, start + self.tile)
                 ins, outs = pixels[part].T, out[part].T
-                if ins.shape[1] != size:
-                    size = ins.shape[1]
-                    frame = [*ins, *outs, *planes.views(size), *uniform]
-                else:
-                    frame[: len(ins) + len(outs)] = [*ins, *outs]
-                _execute(self._code, frame)
+                _execute(self._code, [*ins, *outs, *planes.views(ins.shape[1]), *uniform])
         self._idle.append(planes)
+
+    def _uniform(self, arguments: Sequence[np.generic]) -> Frame:
+        """The part of a frame that comes from the arguments; those of the last run are kept."""
+        last, frame = self._last
+        if last is not arguments:
+            with np.errstate(all="ignore"):
+                frame = self._layout.uniform(arguments, self._dtype)
+            self._last = arguments, frame
+        return frame
 
 
 def _execute(code: Bound, frame: Frame) -> None:
@@ -93,11 +97,16 @@ class _Planes:
     def __init__(self, layout: _Layout, dtype: np.dtype[Any], tile: int) -> None:
         self._numbers = np.empty((layout.allocation.numbers, tile), dtype)
         self._masks = np.empty((layout.allocation.masks, tile), np.bool_)
+        self._size = 0
+        self._views: Frame = []
 
     def views(self, size: int) -> Frame:
         """The buffers for a tile of `size` pixels, as the layout has them."""
-        numbers, masks = self._numbers[:, :size], self._masks[:, :size]
-        return [*numbers, *numbers.view(f"i{numbers.itemsize}"), *masks, *masks.view(np.int8)]
+        if size != self._size:
+            numbers, masks = self._numbers[:, :size], self._masks[:, :size]
+            self._views = [*numbers, *numbers.view(f"i{numbers.itemsize}"), *masks, *masks.view(np.int8)]
+            self._size = size
+        return self._views
 
 
 class _Layout:
