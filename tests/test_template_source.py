@@ -277,7 +277,7 @@ def test_tables_are_as_long_as_what_is_given():
     assert numbers("angles[s - 1]", angles=range(17)) == [16]
     assert numbers("(n, nodes.Z[0])", 2, nodes=np.ones((1, 3)), gloss=[[1]]) == [1, 1]
     result = compiled(TABLES + "output X = nodes.X[0]", constants=GIVEN)
-    assert result.constants["gloss"] == (1, 2, 3, 4, 5, 6, 7, 8)
+    assert result.constants["gloss"] == ((1, 2), (3, 4), (5, 6), (7, 8))
     assert result.constants["angles"] == (0, 15, 30)
 
 

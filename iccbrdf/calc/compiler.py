@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from iccbrdf.calc.emit import emit
 from iccbrdf.calc.graph import Graph
-from iccbrdf.calc.lower import Settings, lower
+from iccbrdf.calc.lower import Setting, Settings, lower
 from iccbrdf.calc.passes import Report, optimise
-from iccbrdf.calc.program import Program
+from iccbrdf.calc.program import Program, Temporary
 from iccbrdf.calc.source import parse
 from iccbrdf.calc.verify import verify
 from iccbrdf.errors import InputError
@@ -27,9 +27,11 @@ class Compiled:
     inputs, outputs: channel names in order.  defaults: one number for each input, what a print that lacks
         the channel has.
     variables: run-time (CMM environment) variables and the value of each where it is undefined.
-    constants: compile-time constants (tuples of numbers, tables row by row) and choices (names) as they were
-        used.
+    constants: compile-time constants (tuples of numbers, tables of rows as tuples of them) and choices
+        (names) as they were used.
     effects: all switches of the template, on or off.
+    templates: text and filename of each; with constants, effects and variables they give the same program.
+    temporaries: the names that the templates give to values which the program stores.
     executed: operators on the longest path for one pixel, every 8-byte operator counted.
     graph: what the program computes.  report: what each pass did.
     """
@@ -41,8 +43,10 @@ class Compiled:
     defaults: tuple[float, ...]
     outputs: tuple[str, ...]
     variables: Mapping[str, float]
-    constants: Mapping[str, tuple[float, ...] | str]
+    constants: Mapping[str, Setting]
     effects: Mapping[str, bool]
+    templates: tuple[tuple[str, str], ...]
+    temporaries: tuple[Temporary, ...]
     executed: int
     graph: Graph
     report: tuple[Report, ...]
@@ -119,7 +123,7 @@ def compile_chain(
     except RecursionError:
         raise InputError(f"{filenames}: expressions are nested too deeply; use `let` for parts") from None
     graph, report = optimise(lowered.graph)
-    program = emit(graph)
+    program, temporaries = emit(graph)
     checked = verify(program, len(lowered.inputs), len(lowered.outputs), where=filenames)
     return Compiled(
         model=" ".join(lowered.models),
@@ -131,6 +135,8 @@ def compile_chain(
         variables=lowered.variables,
         constants=lowered.constants,
         effects=lowered.effects,
+        templates=tuple(templates),
+        temporaries=temporaries,
         executed=checked.executed,
         graph=graph,
         report=report,

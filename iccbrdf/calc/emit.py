@@ -7,7 +7,8 @@ later code use, before it.  Neighbouring values that the same operator computes 
 operator.
 
 The code has temporaries without numbers first.  When all their uses are known, those that are read one
-after the other get neighbouring slots, so that one `tget` reads both.
+after the other get neighbouring slots, so that one `tget` reads both.  No slot is used twice, so that what a
+value is called is the name of its slots.
 
 Only operators that all implementations have are written, and no empty `else` (implementations differ).
 """
@@ -18,13 +19,14 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import TypeAlias
 
 import numpy as np
 
 from iccbrdf.calc.graph import Graph, Node, is_elementwise, needed_by, takes
 from iccbrdf.calc.operators import OPERATORS, Kind, Operand
-from iccbrdf.calc.program import Op, Program
+from iccbrdf.calc.program import Op, Program, Temporary
 from iccbrdf.errors import LimitError
 
 _BY_SCALAR = {"add": "sadd", "sub": "ssub", "mul": "smul", "div": "sdiv", "pow": "gama"}
@@ -42,6 +44,8 @@ class _Block:
     """Neighbouring temporaries that are written together."""
 
     width: int
+    names: tuple[tuple[str, int, int], ...] = ()
+    """Those of the values in it, each with its offset and its width."""
     slot: int = 0
 
 
@@ -71,14 +75,20 @@ class _If:
 _Item: TypeAlias = Op | _Store | _Load | _If
 
 
-def emit(graph: Graph) -> Program:
-    """Return the operators that compute the graph's outputs, the first of them to output channel 0."""
+def emit(graph: Graph) -> tuple[Program, tuple[Temporary, ...]]:
+    """Return the operators that compute the graph's outputs, the first of them to output channel 0.
+
+    With them come the names that the graph has for values which the operators store.
+    """
     emitter = _Emitter(graph)
     _perform(emitter.push(graph.outputs))
     code = _with_copies(emitter.code)
-    _assign_slots(code)
-    program = _flatten(code)
-    return (*program, operator("out", 0, sum(node.width for node in graph.outputs)))
+    blocks = _assign_slots(code)
+    program = (*_flatten(code), operator("out", 0, sum(node.width for node in graph.outputs)))
+    named = (
+        Temporary(name, block.slot + offset, width) for block in blocks for name, offset, width in block.names
+    )
+    return program, tuple(sorted(named, key=lambda temporary: temporary.slot))
 
 
 def operator(name: str, *operands: int) -> Op:
@@ -140,6 +150,7 @@ class _Emitter:
         self._shared = _shared(graph, live)
         self._home = _homes(graph, live)
         self._behind = _reachable(live)
+        self._names = graph.names
 
     def push(self, values: Sequence[Node]) -> _Task:
         """Leave values on the stack in order, and save the shared ones."""
@@ -184,11 +195,14 @@ class _Emitter:
     def _store(self, name: str, nodes: Sequence[Node]) -> None:
         if not nodes:
             return
-        block = _Block(sum(node.width for node in nodes))
-        offset = 0
-        for node in nodes:
-            self._stored[node] = (block, offset)
-            offset += node.width
+        offsets = (0, *accumulate(node.width for node in nodes))
+        names = (
+            (self._names[node], offset, node.width)
+            for node, offset in zip(nodes, offsets, strict=False)
+            if node in self._names
+        )
+        block = _Block(offsets[-1], tuple(names))
+        self._stored.update((node, (block, offset)) for node, offset in zip(nodes, offsets, strict=False))
         self.code.append(_Store(name, block))
 
     def _compute(self, group: Sequence[Node]) -> _Task:
@@ -415,8 +429,8 @@ def _reads(item: _Item, block: _Block) -> bool:
     return isinstance(item, _Load) and item.block is block and item.whole
 
 
-def _assign_slots(code: list[_Item]) -> None:
-    """Number the temporaries so that those that are read one after the other are neighbours."""
+def _assign_slots(code: list[_Item]) -> list[_Block]:
+    """Number the temporaries, which are returned: those that are read one after the other are neighbours."""
     blocks: list[_Block] = []
     wishes: Counter[tuple[_Block, _Block]] = Counter()
     for sequence in _sequences(code):
@@ -442,6 +456,7 @@ def _assign_slots(code: list[_Item]) -> None:
             chain_of.pop(member, None)
             member.slot = slot
             slot += member.width
+    return blocks
 
 
 def _flatten(code: Sequence[_Item]) -> Program:

@@ -25,6 +25,7 @@ from iccbrdf.calc.source import (
     Def,
     Element,
     Expression,
+    Let,
     Name,
     Number,
     Place,
@@ -103,13 +104,19 @@ class Expressions:
         if isinstance(expression, Block):
             inner = dict(names)
             for let in expression.lets:
-                bind(inner, let.place, let.name, self.value(let.value, inner))
+                self.let(let, inner)
             return self.value(expression.value, inner)
         if isinstance(expression, Conditional):
             return self._conditional(expression, names)
         if isinstance(expression, Total):
             return self._total(expression, names)
         return self._call(expression, names)
+
+    def let(self, let: Let, names: dict[str, Named]) -> None:
+        """Let a name stand for the value of an expression."""
+        value = self.value(let.value, names)
+        self._graph.names.setdefault(value, let.name)
+        bind(names, let.place, let.name, value)
 
     def known(self, expression: Expression, names: Mapping[str, Named], what: str) -> tuple[float, ...]:
         """The numbers of an expression that the build already knows."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +38,10 @@ RESERVED_VARIABLES = ("true", "ndef")
 """Names of run-time variables that ICC.2 gives a fixed meaning."""
 
 
+Setting: TypeAlias = tuple[float, ...] | tuple[tuple[float, ...], ...] | str
+"""Numbers of a constant, rows of a table, or the name that a choice has."""
+
+
 @dataclass
 class Lowered:
     """Templates as a graph, and what they declare; `outputs` are the last one's."""
@@ -48,7 +52,7 @@ class Lowered:
     defaults: list[float] = field(default_factory=list)
     outputs: list[str] = field(default_factory=list)
     variables: dict[str, float] = field(default_factory=dict)
-    constants: dict[str, tuple[float, ...] | str] = field(default_factory=dict)
+    constants: dict[str, Setting] = field(default_factory=dict)
     effects: dict[str, bool] = field(default_factory=dict)
     channels: dict[str, Node] = field(default_factory=dict)
     """What each channel holds after the last template."""
@@ -203,8 +207,7 @@ class _Lowering:
         elif isinstance(statement, Table):
             bind(self._globals, statement.place, statement.name, self._table(statement))
         elif isinstance(statement, Let):
-            value = self._expressions.value(statement.value, self._globals)
-            bind(self._globals, statement.place, statement.name, value)
+            self._expressions.let(statement, self._globals)
         elif isinstance(statement, Def):
             self._expressions.define(statement, self._globals)
 
@@ -248,7 +251,7 @@ class _Lowering:
             found = self._variables[name]
             raise declared.place.error(f"{name} is {found!r}; expected 1 finite number (float32)")
         self._result.variables[name] = float(given[0])
-        return self._graph.env(name, float(given[0]))
+        return self._called(name, self._graph.env(name, float(given[0])))
 
     def _constant(self, declared: Constant) -> Node:
         name = declared.name
@@ -261,7 +264,7 @@ class _Lowering:
                 raise declared.place.error(f"{name} is {found!r}; expected {expected}")
             values = tuple(given.tolist())
         self._result.constants[name] = values
-        return self._graph.const(*values)
+        return self._called(name, self._graph.const(*values))
 
     def _table(self, declared: Table) -> Named:
         name, dimensions = declared.name, len(declared.sizes)
@@ -274,10 +277,17 @@ class _Lowering:
             raise declared.place.error(f"{name} is {found!r}; expected finite numbers of shape ({shape})")
         for size, length in zip(declared.sizes, values.shape, strict=True):
             self._check_size(declared, size, length)
-        self._result.constants[name] = tuple(values.ravel().tolist())
         if dimensions == 1:
-            return self._graph.const(*values)
-        return Rows(tuple(map(tuple, values.tolist())))
+            self._result.constants[name] = tuple(values.tolist())
+            return self._called(name, self._graph.const(*values))
+        rows = tuple(map(tuple, values.tolist()))
+        self._result.constants[name] = rows
+        return Rows(rows)
+
+    def _called(self, name: str, node: Node) -> Node:
+        """The node, whose name is known from here on."""
+        self._graph.names.setdefault(node, name)
+        return node
 
     def _check_size(self, table: Table, size: str, length: int) -> None:
         """Bind the name of a size to the first length that has it."""

@@ -215,6 +215,8 @@ def rewrite(graph: Graph, rules: Sequence[Rule]) -> tuple[Graph, Counter[str]]:
                 candidate = better
                 break
         replaced[node] = candidate
+        if node in graph.names:
+            result.names.setdefault(candidate, graph.names[node])
     result.outputs = tuple(replaced[output] for output in graph.outputs)
     check(result)
     return result, changes

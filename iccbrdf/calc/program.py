@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import re
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 from iccbrdf.calc.operators import OPERATORS, Operand
-from iccbrdf.errors import LimitError, ProfileError, nearest
+from iccbrdf.errors import LimitError, ProfileError, UsageError, nearest
 
 MAX_NESTING = 64
 """Blocks inside blocks; no compiler needs more, and a hostile file would exhaust the call stack."""
@@ -42,6 +43,26 @@ class Op(NamedTuple):
 
 
 Program: TypeAlias = tuple[Op, ...]
+
+SLOTS = 65536
+"""Temporary channels of a calculator (ICC.2)."""
+
+
+@dataclass(frozen=True)
+class Temporary:
+    """A name for `size` neighbouring temporary channels from `slot` on."""
+
+    name: str
+    slot: int
+    size: int = 1
+
+    def __post_init__(self) -> None:
+        numbers = isinstance(self.slot, int) and isinstance(self.size, int)
+        if not numbers or not 0 <= self.slot < self.slot + self.size <= SLOTS:
+            raise UsageError(
+                f"temporary {self.name!r}: found slot {self.slot}, size {self.size}, "
+                f"expected them within {SLOTS} slots"
+            )
 
 
 # Bytes -------------------------------------------------------------------------------------------------
@@ -336,35 +357,46 @@ class _Parser:
         return stored[0] << 16 | stored[1]
 
 
-def listing(program: Program) -> str:
+def listing(program: Program, temporaries: Sequence[Temporary] = ()) -> str:
     """The program as text that `parse` turns into the same program: blocks indented, a line for each `out`.
 
-    Bits of an operand that its operator does not use are not shown.  Raises ProfileError for a program
-    with an unknown operator or broken blocks.
+    Where values are stored whose names `temporaries` tells, a comment names them.  Bits of an operand that
+    its operator does not use are not shown.  Raises ProfileError for a program with an unknown operator or
+    broken blocks.
     """
-    return "\n".join(_lines(nest(program), "")) + "\n"
+    names = {slot: t.name for t in temporaries for slot in range(t.slot, t.slot + t.size)}
+    return "\n".join(_lines(nest(program), "", names)) + "\n"
 
 
-def _lines(block: Block, indent: str) -> Iterator[str]:
+def _lines(block: Block, indent: str, names: Mapping[int, str]) -> Iterator[str]:
     line: list[str] = []
     for step in block:
         line.append(written(step.op))
         for word, body in _named_blocks(step):
             if word is not None:
                 line.append(word)
-            lines = list(_lines(body, indent + "  "))
-            if len(lines) < 2 and len("".join(lines)) < 50:
+            lines = list(_lines(body, indent + "  ", names))
+            if len(lines) < 2 and len("".join(lines)) < 50 and "%" not in "".join(lines):
                 line += ["{", *(text.strip() for text in lines), "}"]
                 continue
             yield indent + " ".join([*line, "{"])
             yield from lines
             line = ["}"]
         # A result is where a reader wants to pause, a long line where the eye must.
-        if step.op.name in ("out", "tput", "tsav") or sum(map(len, line)) > 80:
-            yield indent + " ".join(line)
+        stored = _stored_names(step.op, names)
+        if stored or step.op.name in ("out", "tput", "tsav") or sum(map(len, line)) > 80:
+            yield indent + " ".join(line) + (f"  % {' '.join(stored)}" if stored else "")
             line = []
     if line:
         yield indent + " ".join(line)
+
+
+def _stored_names(op: Op, names: Mapping[int, str]) -> list[str]:
+    """The names of what an operation stores, in order, as far as they keep to their line."""
+    if op.name not in ("tput", "tsav"):
+        return []
+    found = (names.get(slot, "") for slot in range(op.s, op.s + op.t + 1))
+    return [name for name in dict.fromkeys(found) if name and name.isprintable()]
 
 
 def _named_blocks(step: Step) -> Iterator[tuple[str | None, Block]]:
