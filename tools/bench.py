@@ -27,6 +27,7 @@ from typing import Any
 import iccdev
 import matplotlib as mpl
 import numpy as np
+from bench_scenes import moved, scenes
 from matplotlib import pyplot as plt
 from numpy.typing import NDArray
 
@@ -50,17 +51,19 @@ PROGRAM_SIZES = (50, 100, 200, 500, 1000, 2000, 5000)
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table: `ratio` is to be at least (or at most) `goal`."""
+    """One line of the table: `ratio` is to be at least (or at most) `goal`, if there is one."""
 
     work: str
     against: str
     ratio: float
-    goal: float
+    goal: float | None
     at_most: bool = False
     figures: Mapping[str, float] | None = None
 
     @property
     def holds(self) -> bool:
+        if self.goal is None:
+            return True
         return self.ratio <= self.goal if self.at_most else self.ratio >= self.goal
 
 
@@ -204,6 +207,49 @@ def interpolation(place: Path) -> list[Row]:
         Row("Smooth interpolation + Cook-Torrance, LLVM", "published one, LLVM",
             seconds["llvm"] / seconds["smooth, llvm"], 5),
     ]  # fmt: skip
+
+
+SCENE_GOALS = {"flat matte": 0.25, "relief matte": 0.5}
+"""The part of the full program's time that the reduced one may take."""
+
+
+def reduced(place: Path) -> list[Row]:
+    """What plans spare; rows without a goal tell what scenes cost that call for gloss."""
+    chain = [build_colour_mid(PRIMARIES, interpolation="published").mid, build_pair(PRIMARIES).mvis]
+    published = iccbrdf.link(chain, backend="llvm")
+    rows: list[Row] = []
+    for name, scene in scenes().items():
+        pixels = np.resize(scene.pixels, (MEGAPIXEL, scene.pixels.shape[1]))
+        few = pixels[:FEW]
+        colours = colour_pixels(FEW)
+        out = np.empty((MEGAPIXEL, 3), np.float32)
+        works: dict[str, Callable[[], Any]] = {
+            "copy": partial(moved, pixels, np.empty_like(pixels), out),
+            "published, llvm": partial(published, colours),
+        }
+        for form, chain in {"full": scene.full, "reduced": scene.reduced}.items():
+            folder = place / name / form
+            folder.mkdir(parents=True)
+            works[f"iccdev, {form}"] = partial(reference(chain, folder).apply_ndarray, few)
+            for backend in ("numpy", "llvm"):
+                works[f"{backend}, {form}"] = partial(iccbrdf.link(chain, backend=backend), pixels)
+        seconds = in_turns(works)
+        for work in works:
+            seconds[work] /= len(few) if "iccdev" in work or "published" in work else len(pixels)
+        goal = SCENE_GOALS.get(name)
+        without = ", ".join(scene.without) or "nothing"
+        for label, backend in {"NumPy": "numpy", "the ICC's CMM": "iccdev"}.items():
+            ratio = seconds[f"{backend}, reduced"] / seconds[f"{backend}, full"]
+            rows.append(Row(f"{name}: without {without}; {label}", "full Cook-Torrance", ratio, goal, True,
+                            figures=per_pixel(seconds, 1)))  # fmt: skip
+        llvm = seconds["llvm, reduced"]
+        rows += [
+            Row(f"{name}, LLVM", "a copy of the same bytes", llvm / seconds["copy"],
+                1.3 if goal else None, True),
+            Row(f"{name}, LLVM", "published interpolation + Cook-Torrance", llvm / seconds["published, llvm"],
+                0.25 if goal else None, True),
+        ]  # fmt: skip
+    return rows
 
 
 COPY = """
@@ -376,11 +422,9 @@ def table(rows: Sequence[Row], costs: Sequence[Mapping[str, Any]], machine: str)
         "|---|---|---|---|",
     ]
     for row in rows:
-        sign = "at most" if row.at_most else "at least"
+        goal = "" if row.goal is None else f"{'at most' if row.at_most else 'at least'} {row.goal:g}"
         ratio = f"{row.ratio:.0f}" if row.ratio >= 20 else f"{row.ratio:.2f}"
-        lines.append(
-            f"| {row.work} | {row.against} | {ratio}{'' if row.holds else ' (!)'} | {sign} {row.goal:g} |"
-        )
+        lines.append(f"| {row.work} | {row.against} | {ratio}{'' if row.holds else ' (!)'} | {goal} |")
     if costs:
         lines += [
             "",
@@ -418,6 +462,7 @@ def draw(growth: Mapping[str, Mapping[str, Sequence[float]]], path: Path) -> Non
 PARTS: Mapping[str, Callable[[Path, float], list[Row]]] = {
     "cook-torrance": lambda place, large: cook_torrance(place),
     "interpolation": lambda place, large: interpolation(place),
+    "scenes": lambda place, large: reduced(place),
     "end-to-end": lambda place, large: end_to_end(place),
     "memory": memory,
     "start-up": lambda place, large: start_up(place),
