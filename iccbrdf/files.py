@@ -118,6 +118,11 @@ def write_together(files: Mapping[Path, bytes], *, overwrite: bool = False) -> N
             stack.enter_context(atomic_output(path, overwrite=overwrite)).write_bytes(data)
 
 
+def as_text(name: str) -> str:
+    """The name of a file for documents: bytes in it that are no text become question marks."""
+    return name.encode(errors="replace").decode()
+
+
 def make_folder(path: StrPath) -> None:
     """Make a folder for outputs, and those above it, unless it is there; UsageError where that cannot be."""
     try:

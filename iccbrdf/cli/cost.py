@@ -26,7 +26,7 @@ from iccbrdf.cli.options import (
 )
 from iccbrdf.cli.pipeline import open_image
 from iccbrdf.errors import UsageError, nearest
-from iccbrdf.files import check_target, make_folder, write_together
+from iccbrdf.files import as_text, check_target, make_folder, write_together
 from iccbrdf.images import Samples
 from iccbrdf.planning import Planning
 from iccbrdf.report.cost import RUNS, STATISTICS, Cost, CostReport, Statistic, measure_image, recommend
@@ -196,7 +196,7 @@ def pictures(
     name = shown or (best.way if best else PLAIN).name
     if name not in by_name:
         raise UsageError(f"--show: no way {name!r} was measured: {nearest(name, by_name)}")
-    heading = f"Ways to the proof of {title}"
+    heading = f"Ways to the proof of {as_text(title)}"
     return {
         "cost.png": plot_front(report, title=heading, recommended=best, budget=budget),
         "cost_errors.png": plot_errors(report, by_name[name]),

@@ -27,8 +27,11 @@ def checked_environment(env: Mapping[str, float], variables: Iterable[str]) -> d
             )
         try:
             number = float(value)
-        except (TypeError, ValueError, OverflowError):
+        except (TypeError, ValueError):
             number = np.nan
+        # An integer that may be too long to be shown.
+        except OverflowError:
+            value = number = np.inf
         if not abs(number) <= _LARGEST:
             raise VariableError(
                 f"run-time variable {name!r}: found {value!r}, expected a finite number (float32)"

@@ -28,7 +28,6 @@ whose first line is `# schema = "iccbrdf-measurements"`, as `write_measurements`
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -36,12 +35,7 @@ from iccbrdf.brdf.primaries import ILLUMINANTS, OBSERVERS
 from iccbrdf.brdf.records import Record
 from iccbrdf.errors import InputError, LimitError, UsageError
 from iccbrdf.files import StrPath, read_whole
-
-# Python 3.10 has no reader of TOML.
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from iccbrdf.toml import parse_toml
 
 MAX_BYTES = 1 << 16
 """Of declarations, in a file or at the head of a table: the reading of TOML may take their square."""
@@ -212,16 +206,15 @@ def _toml(text: str, place: str) -> dict[str, Any]:
     if len(text) > MAX_BYTES:
         raise LimitError(f"{place}: larger than the limit of {MAX_BYTES} bytes")
     try:
-        values: dict[str, Any] = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
+        return parse_toml(text)
+    except ValueError as error:
         raise InputError(f"{place}: is not TOML: {error}") from error
-    return values
 
 
 def _value(text: str) -> Any:
     """A number or a list, where the text is one."""
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except (ValueError, RecursionError):
+        value = parse_toml(f"value = {text}")["value"]
+    except ValueError:
         return text
     return value if isinstance(value, int | float | list | str) else text

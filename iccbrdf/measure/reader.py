@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from iccbrdf.brdf.geometry import Array
 from iccbrdf.brdf.primaries import white_of
 from iccbrdf.errors import InputError, LimitError
-from iccbrdf.files import StrPath
+from iccbrdf.files import StrPath, as_text
 from iccbrdf.measure.colorimetry import (
     SPECTRAL_ILLUMINANT,
     SPECTRAL_OBSERVER,
@@ -89,7 +89,7 @@ def read_measurements(path: StrPath, **declarations: Any) -> Measurements:
         illuminant=readings.illuminant,
         observer=readings.observer,
         white=readings.white,
-        source=declared.text("source", Path(path).name),
+        source=declared.text("source", as_text(Path(path).name)),
         cmyk=_inks(table, columns, rows) if columns.has(INKS) else None,
         slopes=np.array([slope for _, slope in rows.patches]) if "slope" in columns else None,
         wavelengths=columns.wavelengths if columns.spectral else None,

@@ -5,7 +5,6 @@ Each field of `Job` is a key of the TOML file and an option of `iccbrdf proof`, 
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
@@ -16,11 +15,7 @@ from iccbrdf.errors import IccBrdfError, InputError, UsageError, nearest
 from iccbrdf.files import read_whole
 from iccbrdf.images.showing import DISPLAYS, HIGHLIGHTS
 from iccbrdf.proof import values as to
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from iccbrdf.toml import parse_toml
 
 MAX_BYTES = 1 << 16
 """Of a job file: the reading of TOML may take its square."""
@@ -159,8 +154,8 @@ def read_job(path: Path, overriding: Mapping[str, Any] | None = None) -> Job:
         An overriding setting is unknown or has no such value.
     """
     try:
-        values = tomllib.loads(read_whole(path, MAX_BYTES).decode("utf-8"))
-    except (ValueError, RecursionError) as error:
+        values = parse_toml(read_whole(path, MAX_BYTES).decode("utf-8"))
+    except ValueError as error:
         raise InputError(f"{path}: is not TOML: {error}") from error
     read = _read(values, path.parent, f"{path}: ", InputError)
     return _job({**read, **_read(overriding or {}, Path(), "--", UsageError)}, f"{path}: ", InputError)

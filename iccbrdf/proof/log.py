@@ -12,12 +12,17 @@ from pathlib import Path
 from typing import Any
 
 import iccbrdf
-from iccbrdf.errors import InputError
+from iccbrdf.errors import IccBrdfError, InputError
+from iccbrdf.files import read_whole
 from iccbrdf.images.showing import DISPLAYS
 from iccbrdf.proof.job import Job
 
 SCHEMA = "iccbrdf.proof/1"
 NAME = "proof.json"
+MAX_BYTES = 16 << 20
+"""Of a log: a thousand times those of common jobs."""
+_SCENE = {"light", "view", "env", "picture", "clipped"}
+"""What others read of a scene's entry."""
 
 _PACKAGES = ("numpy", "scipy", "imagecodecs", "tifffile", "pillow", "OpenEXR", "llvmlite")
 
@@ -71,14 +76,15 @@ def versions() -> dict[str, str]:
 def earlier(job: Job, expected: str) -> dict[str, Any] | None:
     """The log of an earlier run that did just this, and whose outputs are all there; else None."""
     try:
-        log = json.loads((job.output / NAME).read_bytes())
+        log = json.loads(read_whole(job.output / NAME, MAX_BYTES))
         files = [(job.output / output["file"], output["bytes"]) for output in log["outputs"]]
         same = log["schema"] == SCHEMA and log["signature"] == expected
         same = same and all(path.stat().st_size == size for path, size in files)
+        same = same and all({*scene} >= _SCENE and 0 <= scene["clipped"] <= 1 for scene in log["scenes"])
     # No log, another program's, or outputs that are gone.
-    except (OSError, ValueError, KeyError, TypeError):
+    except (IccBrdfError, OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
-    return log if same else None
+    return {**log, "job": settings(job)} if same else None
 
 
 def _hashed(path: Path) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from iccbrdf.brdf.slopes import read_slopes
 from iccbrdf.build import build_colour_mid, build_pair, last_slope
 from iccbrdf.cmm import link, standard_XYZ
 from iccbrdf.errors import IccBrdfWarning, InputWarning, LimitError, UsageError
-from iccbrdf.files import atomic_output, check_target, make_folder, write_together
+from iccbrdf.files import as_text, atomic_output, check_target, make_folder, write_together
 from iccbrdf.icc import read_profile
 from iccbrdf.images import ImageSource, WithNormals, create_png, create_tiff
 from iccbrdf.images.display import create_rgb_tiff
@@ -140,8 +140,8 @@ def _make(job: Job, overwrite: bool, workers: int, advance: Callable[[int, int],
         # Before the pictures appear under their names, so that a failure leaves none of them.
         if small:
             cells = [Cell(s.light, s.view, cell.XYZ) for s, cell in zip(stills, small, strict=True)]
-            title = job.image.name.encode(errors="replace").decode()
-            write_sheet(job.output / outputs.sheet, title, cells, showing, overwrite=overwrite)
+            sheet = job.output / outputs.sheet
+            write_sheet(sheet, as_text(job.image.name), cells, showing, overwrite=overwrite)
         if moving:
             kind = cast(Literal["png", "webp"], job.sweep_format)
             write_animation(

@@ -18,6 +18,7 @@ from importlib.resources import files
 from typing import Any
 
 from iccbrdf.errors import InputError, LinkError, UnsupportedError
+from iccbrdf.files import as_text
 from iccbrdf.icc import Profile
 from iccbrdf.images import ImageSource
 from iccbrdf.scene import LIGHT, VIEW
@@ -140,7 +141,7 @@ def make_page(shown: Print, display: Display, title: str, start: Start | None = 
     )
     parts = {
         "policy": policy,
-        "title": html.escape(title),
+        "title": html.escape(as_text(title)),
         "style": style,
         "page": page,
         "layers": "".join(f'<i data-codes="{layer.packed()}"></i>' for layer in shown.layers),
