@@ -1,7 +1,8 @@
 """All targets for minutes, with a report: PYTHONPATH=tests python -m fuzz [--seconds N] [-o FOLDER] [TARGET].
 
 Half of a target's time goes to seeded mutations, which anybody can repeat, half to atheris, which follows
-what it covers.  Exit code 1 where there are findings; the inputs lie in the folder.
+what it covers.  The report is report.md in the folder, the inputs that are findings lie beside it.
+Exit code 1 where there are any.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from fuzz.report import markdown, row
 from fuzz.targets import TARGETS
 
 
@@ -23,7 +25,10 @@ def main() -> int:
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=f"{', '.join(TARGETS)}; default: all")
     parser.add_argument("--seconds", type=float, default=240, help="for each target")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("-o", dest="folder", type=Path, default=Path("fuzz"), help="report and findings")
+    parser.add_argument(
+        "-o", dest="folder", type=Path, default=Path("build/fuzz"), help="for the report and findings"
+    )
+    parser.add_argument("--summary", type=Path, help="where the report is written, too")
     wanted = parser.parse_args()
     targets = wanted.targets or list(TARGETS)
     for name in targets:
@@ -37,12 +42,12 @@ def main() -> int:
         for engine in engines:
             label = f"{name} ({engine})"
             results[label] = _run(name, engine, wanted.seconds / len(engines), wanted.seed, wanted.folder)
-            print(_row(label, results[label]), flush=True)
+            print(row(label, results[label]), flush=True)
     (wanted.folder / "report.json").write_text(json.dumps(results, indent=1) + "\n")
-    table = ["| target | inputs | taken | seconds | worst s | worst MiB | findings |", "|---" * 7 + "|"]
-    (wanted.folder / "report.md").write_text(
-        "\n".join([*table, *(_row(label, result) for label, result in results.items())]) + "\n"
-    )
+    report = markdown(results)
+    for path in filter(None, (wanted.folder / "report.md", wanted.summary)):
+        path.write_text(report)
+        print(f"  -> {path}")
     return 1 if any(result["findings"] for result in results.values()) else 0
 
 
@@ -63,12 +68,6 @@ def _run(name: str, engine: str, seconds: float, seed: int, folder: Path) -> dic
     if done.returncode:
         counts["findings"][f"exit code {done.returncode}"] = {"error": f"see {log}", "times": 1}
     return counts | {"seconds": round(time.monotonic() - begun, 1)}
-
-
-def _row(label: str, result: dict[str, Any]) -> str:
-    columns = ("inputs", "taken", "seconds", "worst_seconds", "worst_memory_mib")
-    found = "; ".join(f"{key}: {finding['error']}" for key, finding in result["findings"].items()) or "none"
-    return f"| {label} | " + " | ".join(str(result[column]) for column in columns) + f" | {found} |"
 
 
 if __name__ == "__main__":

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import io
 import json
+import zlib
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import icc_examples
 import imagecodecs
 import numpy as np
+import proof_examples
 import tifffile
 import xml_examples
 
 from iccbrdf.calc.program import encode_ops, parse
-from iccbrdf.icc import Profile
+from iccbrdf.icc import XYZ, Curve, ExtendedClut, Header, LutAToB, Profile
 from iccbrdf.icc.xml import profile_to_xml
+from iccbrdf.images.blocks import Block
+from iccbrdf.images.exr import create_exr
+from iccbrdf.images.showing import srgb
 from iccbrdf.resources import folder
 
 _HERE = folder("profiles") / "fogra39_gloss"
@@ -133,3 +140,97 @@ def jobs() -> list[bytes]:
         b'image = "a.tif"\nprimaries = "p.json"\nnormals = "n.png"\nsheet = true\nsweep = "60,0:60,360"\n'
         b'env = ["litI=3"]\nexposure = 1.5\ndepth = "16"\nkeep = ["xyz"]\n',
     ]
+
+
+def packed() -> list[bytes]:
+    """Compressed texts."""
+    return [zlib.compress(text.encode()) for text in ("", "a text\0", "<CxF>\u00e4</CxF>" * 1000)]
+
+
+def templates() -> list[bytes]:
+    """Models in the source language."""
+    names = ("cook_torrance", "ward")
+    return [(folder("calc_templates") / f"{name}.calc").read_bytes() for name in names]
+
+
+def arguments() -> list[bytes]:
+    """Light, view, sweep, and run-time variables, a line each."""
+    return [
+        b"45,180\n0,0\n60,0:60,360\nlitI=3\nlitX=-1e-7",
+        b"left=0.5,0,1\nabove=1,-2,3e5\n-10,20:30,40\nlitZ=0",
+    ]
+
+
+def logs() -> list[bytes]:
+    """What `iccbrdf proof` logs, as far as anything reads it."""
+    scene = {"light": "45,180", "view": "0,0", "env": {"litX": -0.7, "litI": 4.5}, "picture": "proof.png"}
+    log = {
+        "schema": "iccbrdf.proof/1",
+        "status": "done",
+        "signature": "0",
+        "job": {"output": "out", "reference-white": "flat", "highlights": "clip", "exposure": 1.5},
+        "inputs": {"image": {"path": "a.tif", "bytes": 9, "sha256": "0"}},
+        "scenes": [{**scene, "clipped": 0.25}],
+        "outputs": [{"file": "flat.tif", "bytes": 0}],
+    }
+    return [json.dumps(log).encode()]
+
+
+def page_profiles() -> list[bytes]:
+    """The profiles of a page: an MVIS, and a MID."""
+    return [(_HERE / name).read_bytes() for name in ("mvis.icc", "mid.icc")]
+
+
+def cmyk_profile() -> bytes:
+    """A version 4 printer of two points an ink."""
+    identity = (Curve(),) * 3
+    table = np.random.default_rng(0).random((2, 2, 2, 2, 3)).astype(np.float32)
+    lut = LutAToB(b_curves=identity, clut=ExtendedClut(table, 2), a_curves=(Curve(),) * 4)
+    tags = {"A2B0": lut, "wtpt": XYZ.of(0.9, 1, 0.8)}
+    header = Header(device_class="prtr", colour_space="CMYK", pcs="XYZ ", version=(4, 4, 0))
+    return Profile(header, tags).to_bytes()
+
+
+def device_profiles() -> list[bytes]:
+    """Displays and a printer of version 4: by a matrix, and by tables."""
+    return [proof_examples.lut_display().to_bytes(), srgb().to_bytes(), cmyk_profile()]
+
+
+def print_jobs() -> list[bytes]:
+    """Images in CMYK, RGB, L*a*b* and XYZ."""
+    ink = (np.arange(4 * 5 * 4, dtype=np.uint8) * 3).reshape(4, 5, 4)
+    record = {"schema": "iccbrdf.image/1", "samples": "real", "channels": ["X", "Y", "Z"]}
+    colours = ink[..., :3] / np.float32(255)
+    found = []
+    for data, options in (
+        (ink, {"photometric": "separated", "iccprofile": cmyk_profile()}),
+        (ink[..., :3], {"photometric": "rgb", "iccprofile": srgb().to_bytes()}),
+        (ink[..., :3].astype(np.uint16) * 99, {"photometric": "icclab"}),
+        (colours, {"photometric": "cielab"}),
+        (colours, {"photometric": "minisblack", "planarconfig": "contig", "description": json.dumps(record)}),
+    ):
+        file = io.BytesIO()
+        tifffile.imwrite(file, data, metadata=None, **options)
+        found.append(file.getvalue())
+    return found
+
+
+def exrs() -> list[bytes]:
+    """OpenEXR files, of ours and without a record."""
+    found = []
+    with TemporaryDirectory() as place:
+        for dtype in ("float32", "float16"):
+            path = Path(place) / f"{dtype}.exr"
+            names = ("kd.X", "m", "n.z")
+            with create_exr(path, 40, 6, names, samples="real", dtype=dtype) as sink:
+                for y0 in (0, 32):
+                    sink.write(Block(y0, 0, np.full((min(32, 40 - y0), 6, 3), 0.25, np.float32)))
+            found.append(path.read_bytes())
+    return found
+
+
+def fitted_tables() -> list[bytes]:
+    """Measurements of two patches, enough to be fitted."""
+    rows = [f"{p},{i},{r},{k + i / 900},{k},{k / 2}" for p, k in (("paper", 0.8), ("cyan", 0.2))
+            for i in (0, 45) for r in (-60, -45, 0, 30, 60)]  # fmt: skip
+    return [(_DECLARED + _VIEW + "\n".join(["patch,theta_i,theta_r,X,Y,Z", *rows]) + "\n").encode()]

@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+import functools
+import io
+import json
+import math
 import warnings
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import SimpleNamespace
 
 import numpy as np
+import tifffile
 
 from fuzz import seeds
-from iccbrdf.brdf.primaries import read_primaries
+from iccbrdf.brdf.primaries import Primaries, read_primaries
 from iccbrdf.brdf.slopes import read_slopes
-from iccbrdf.build import build_pair
+from iccbrdf.build import build_colour_mid, build_pair
+from iccbrdf.calc import compile_template
 from iccbrdf.calc.operators import OPERATORS
 from iccbrdf.calc.program import decode_ops, listing
 from iccbrdf.calc.verify import verify
-from iccbrdf.cmm import link
+from iccbrdf.cli import cli
+from iccbrdf.cmm import Transform, link
+from iccbrdf.cmm.environment import checked_environment
 from iccbrdf.errors import (
     IccBrdfWarning,
     InputError,
@@ -27,10 +36,13 @@ from iccbrdf.errors import (
     ProfileError,
     UnsupportedError,
     UsageError,
+    VariableError,
 )
 from iccbrdf.icc import (
     Calculator,
     Clut,
+    CompressedUtf8,
+    CompressedXml,
     CurveSet,
     FormulaSegment,
     Header,
@@ -40,12 +52,24 @@ from iccbrdf.icc import (
     SegmentedCurve,
     XYZToJab,
     describe,
+    read_profile,
+    to_dict,
 )
+from iccbrdf.icc.compare import compare
 from iccbrdf.icc.xml import profile_from_xml, profile_to_xml
-from iccbrdf.images import open_tiff, read_height_map, read_normal_map
+from iccbrdf.images import ImageSource, open_tiff, read_height_map, read_normal_map
+from iccbrdf.images.exr import open_exr
+from iccbrdf.images.little_cms import check_profile, to_XYZ
+from iccbrdf.images.showing import Showing, display_profile
 from iccbrdf.measure import read_measurements
-from iccbrdf.proof.job import read_job
-from iccbrdf.validate import validate
+from iccbrdf.proof.colour_in import ColourIn
+from iccbrdf.proof.job import make_job, read_job
+from iccbrdf.proof.log import earlier
+from iccbrdf.proof.scenes import scenes
+from iccbrdf.proof.scenes import sweep as sweep_scenes
+from iccbrdf.resources import folder
+from iccbrdf.validate import CHECKS, check_numeric, validate, validate_pair
+from iccbrdf.viewer import make_display, make_page, read_folder, read_print
 
 OF_PROFILES = (ProfileError, UnsupportedError, LimitError)
 """The three errors that a profile may cause: malformed, unsupported, over a limit."""
@@ -73,16 +97,20 @@ class Target:
 # Profiles ------------------------------------------------------------------------------------------------
 
 
+_HERE = folder("profiles") / "fogra39_gloss"
+_PAIR = [(_HERE / name).read_bytes() for name in ("mid.icc", "mvis.icc")]
+
+
 def _pixels(channels: int) -> np.ndarray:
     return np.resize(np.array(_ODD, np.float32), (len(_ODD), min(channels, 65535)))
 
 
-def run_chain(profile: Profile, *backends: str) -> bool:
-    """Link and run a profile; whether it could be."""
+def run_chain(profiles: list[Profile], *backends: str) -> bool:
+    """Link and run profiles; whether it could be."""
     taken = False
     for backend in backends:
         try:
-            transform = link([profile], backend=backend, max_cost=MAX_COST)
+            transform = link(profiles, backend=backend, max_cost=MAX_COST)
             transform(_pixels(len(transform.channels_in)))
         # A profile for another place in a chain is no fault of its own.
         except (*OF_PROFILES, LinkError):
@@ -92,8 +120,10 @@ def run_chain(profile: Profile, *backends: str) -> bool:
 
 
 def profile(data: bytes) -> bool:
-    """Decode all tags, write them back as bytes and as XML, describe, validate, link and run."""
-    validate(data, "a.icc")
+    """Decode all tags, write them back as bytes and as XML, describe, compare, validate, link and run."""
+    validate(data, "a.icc", checks=(*CHECKS, check_numeric))
+    for other in _PAIR:
+        validate_pair((data, "a.icc"), (other, "b.icc"))
     try:
         read = Profile.from_bytes(data, "a.icc")
     except OF_PROFILES:
@@ -105,14 +135,18 @@ def profile(data: bytes) -> bool:
             read[signature]
         except OF_PROFILES:
             continue
-    describe(read)
+    describe(read, listing=listing)
+    to_dict(read, listing=listing)
+    compare(read, Profile.from_bytes(_PAIR[0]), listing=listing)
     try:
         xml = profile_to_xml(read)
     except OF_PROFILES:
         pass
     else:
         xml_file(xml)
-    return run_chain(read, "numpy", "interpreter")
+    taken = run_chain([read], "numpy", "interpreter")
+    mid, mvis = map(Profile.from_bytes, _PAIR)
+    return run_chain([mid, read], "numpy") | run_chain([read, mvis], "numpy") | taken
 
 
 def xml_file(data: bytes) -> bool:
@@ -147,41 +181,167 @@ def program(data: bytes) -> bool:
     process = MultiProcess.of(Calculator(3, 3, operations, elements))
     header = Header(device_class="scnr", colour_space="RGB ", pcs="XYZ ")
     # The quickest back end first, which makes machine code.
-    return run_chain(Profile(header, {"A2B0": process}), "auto", "numpy", "interpreter")
+    return run_chain([Profile(header, {"A2B0": process})], "auto", "numpy", "interpreter")
+
+
+def template(data: bytes) -> bool:
+    """A model in the source language, which profiles carry."""
+    try:
+        compile_template(data.decode("utf-8", "replace"), filename="a.calc")
+    except OF_FILES:
+        return False
+    return True
+
+
+def packed(data: bytes) -> bool:
+    """Compressed text in tags."""
+    try:
+        for tag in (CompressedUtf8(data), CompressedXml(data)):
+            describe(Profile(Header(device_class="scnr"), {"meta": tag}))
+            tag.text.encode()
+    except OF_PROFILES:
+        return False
+    return True
+
+
+@functools.cache
+def _black() -> bytes:
+    """Two pixels of ten channels."""
+    file = io.BytesIO()
+    tifffile.imwrite(file, np.zeros((1, 2, 10), np.uint8), photometric="minisblack", planarconfig="contig")
+    return file.getvalue()
+
+
+def page(data: bytes) -> bool:
+    """The page of an image that goes through a profile: shader and script are made of it."""
+
+    def read(path: Path) -> None:
+        image = path.with_name("a.tif")
+        image.write_bytes(_black())
+        profile = read_profile(path)
+        chain = (
+            [profile, Profile.from_bytes(_PAIR[1])] if profile.header.device_class == "mid " else [profile]
+        )
+        with open_tiff(image) as source:
+            shown = read_print(source, chain, None, {})
+        text = make_page(shown, make_display("srgb"), "a")
+        # What profiles say stays text: no element of the page ends or begins in it.
+        if text.count("<script") != 2 or text.count("</script") != 2:
+            raise ValueError("text of a profile became part of the page")
+
+    # A chain that gives no XYZ, or knows no light, is no fault of the profile.
+    return _in_file(data, "a.icc", read, (*OF_PROFILES, InputError, LinkError, UsageError))
+
+
+def device_profile(data: bytes) -> bool:
+    """A profile of version 2 or 4, as a display's and as a printer's."""
+
+    def read(path: Path) -> None:
+        profile = read_profile(path)
+        if profile.header.colour_space == "CMYK":
+            check_profile(profile, "CMYK", "a job")
+            to_XYZ(np.resize(np.float32([0, 0.5, 1]), (3, 3, 4)), profile, "absolute")
+            return
+        showing = Showing(display_profile(path), 1.5, "roll-off", True)
+        showing(np.resize(np.array(_ODD, np.float32), (4, 9, 3)))
+
+    return _in_file(data, "a.icc", read, (*OF_PROFILES, InputError))
+
+
+def arguments(data: bytes) -> bool:
+    """Directions and run-time variables as people write them, a line each."""
+    light, view, sweep, *env = [*data.decode("utf-8", "replace").split("\n"), "", ""]
+    env = [item for item in env if item]
+    job = {"image": "a.tif", "primaries": "p.json", "light": light, "view": view, "sweep": sweep, "env": env}
+    try:
+        made = make_job({key: value for key, value in job.items() if value})
+        for scene in (*scenes(made, np.pi), *sweep_scenes(made, np.pi)):
+            _mvis().with_env(scene.env)
+    except (UsageError, LimitError, VariableError):
+        return False
+    return True
+
+
+@functools.cache
+def _mvis() -> Transform:
+    return link([Profile.from_bytes(_PAIR[1])])
 
 
 # Files of users ------------------------------------------------------------------------------------------
 
 
-def _in_file(data: bytes, name: str, read: Callable[[Path], object]) -> bool:
+def _in_file(
+    data: bytes, name: str, read: Callable[[Path], object], errors: tuple[type[Exception], ...] = OF_FILES
+) -> bool:
     with TemporaryDirectory(prefix="fuzz-") as folder:
         path = Path(folder) / name
         path.write_bytes(data)
         try:
             read(path)
-        except OF_FILES:
+        except errors:
             return False
     return True
 
 
 def primaries(data: bytes) -> bool:
     """A primaries file, and the profiles of what it says."""
-    return _in_file(data, "primaries.json", lambda path: build_pair(read_primaries(path)))
+
+    def read(path: Path) -> None:
+        found = read_primaries(path)
+        pair = build_pair(found)
+        made = [pair.mid, pair.mvis]
+        if len(found.primaries) >= 4:
+            made.append(build_colour_mid(found).mid)
+        for profile in made:
+            profile.to_bytes()
+
+    return _in_file(data, "primaries.json", read)
+
+
+@functools.cache
+def _primaries() -> Primaries:
+    return read_primaries(_HERE / "primaries.json")
 
 
 def slopes(data: bytes) -> bool:
-    """A slopes file."""
-    return _in_file(data, "slopes.json", read_slopes)
+    """A slopes file, and the colour MID of what it says."""
+
+    def read(path: Path) -> None:
+        build_colour_mid(_primaries(), slopes=read_slopes(path)).mid.to_bytes()
+
+    return _in_file(data, "slopes.json", read)
+
+
+_DECLARED = {
+    "geometry": "45:0",
+    "quantity": "reflectance",
+    "illuminant": "D50",
+    "observer": "CIE 1931 2 Degree Standard Observer",
+    "scale": 1,
+}
 
 
 def table(data: bytes) -> bool:
     """A table of measurements behind a line that names its format."""
     kind, _, text = data.partition(b"\n")
     ending = kind.decode("latin-1") if kind in (b"csv", b"tsv", b"txt", b"brdf") else "csv"
-    declared = {"txt": SimpleNamespace(geometry="45:0", quantity="reflectance", illuminant="D50",
-                observer="CIE 1931 2 Degree Standard Observer", scale=1)}  # fmt: skip
-    declarations = vars(declared[ending]) if ending in declared else {}
+    declarations = _DECLARED if ending == "txt" else {}
     return _in_file(text, f"table.{ending}", lambda path: read_measurements(path, **declarations))
+
+
+def fitted(data: bytes) -> bool:
+    """A table of measurements, and what is fitted to it."""
+
+    def read(path: Path) -> None:
+        _command("fit", path, "-o", path.with_name("out.json"), "--starts", "1")
+
+    return _in_file(data, "table.csv", read)
+
+
+def _command(*words: object) -> None:
+    """Run a command, whose errors are raised."""
+    with redirect_stdout(io.StringIO()):
+        cli.main([str(word) for word in words], standalone_mode=False)
 
 
 def tiff(data: bytes) -> bool:
@@ -189,13 +349,35 @@ def tiff(data: bytes) -> bool:
 
     def read(path: Path) -> None:
         with open_tiff(path) as image:
-            for number, place in enumerate(image.places(4096)):
-                # The header may promise any number of blocks; sparse ones cost nothing to promise.
-                if number == 64:
-                    break
-                image.read(place)
+            _some_blocks(image)
 
     return _in_file(data, "a.tif", read)
+
+
+def _some_blocks(image: ImageSource) -> None:
+    # The header may promise any number of blocks; sparse ones cost nothing to promise.
+    for place in islice(image.places(), 64):
+        image.read(place)
+
+
+def print_job(data: bytes) -> bool:
+    """The image of a print job, with the profile in it."""
+
+    def read(path: Path) -> None:
+        with ColourIn(path, None, _primaries()) as image:
+            _some_blocks(image)
+
+    return _in_file(data, "a.tif", read, (*OF_FILES, ProfileError))
+
+
+def exr(data: bytes) -> bool:
+    """An OpenEXR file, block by block."""
+
+    def read(path: Path) -> None:
+        with open_exr(path) as image:
+            _some_blocks(image)
+
+    return _in_file(data, "a.exr", read)
 
 
 def picture(data: bytes) -> bool:
@@ -217,13 +399,36 @@ def job(data: bytes) -> bool:
     return _in_file(data, "job.toml", read)
 
 
+def log(data: bytes) -> bool:
+    """The log of a proof: as a page starts from it, and as a job is skipped by it."""
+
+    def read(path: Path) -> None:
+        path.with_name("flat.tif").touch()
+        try:
+            signature = json.loads(data)["signature"]
+        except (ValueError, RecursionError, TypeError, KeyError):
+            signature = ""
+        made = make_job({"image": "a.tif", "primaries": "p.json", "output": str(path.parent)})
+        if (found := earlier(made, signature)) is not None:
+            [f"{scene['light']} {scene['clipped']:.2%}" for scene in found["scenes"]]
+        start = read_folder(path.parent)
+        math.log2(start.start.exposure)
+        checked_environment(start.env, start.env)
+
+    # So it says of a variable beyond float32.
+    return _in_file(data, "proof.json", read, (*OF_FILES, VariableError))
+
+
 # All of them ---------------------------------------------------------------------------------------------
 
 _OPERATORS = tuple(name.encode().ljust(4) for name in OPERATORS)
 _TYPES = (
     b"mpet cvst matf clut xclt calc func curf parf samf sngf clcf tint eobs robs emtx tmap tary utf8 mluc"
 ).split()
-_NAMES = tuple(b'"a" null true NaN -1 1e999 [] {} "" 0 99999999999999999999 , : [ ] { } "model" "X"'.split())
+_LANGUAGE = tuple(b"( ) [ ] { } , = == ^ * / - + 1e39 1e-46 0 if else and or not in out let sum dot".split())
+_NAMES = tuple(
+    b'"a" "\\ud800" null true NaN -1 1e999 [] {} "" 0 99999999999999999999 , : [ ] { } "model" "X"'.split()
+)
 _MARKUP = tuple(
     b"&lt; &#0; <!-- --> <![CDATA[ ]]> <MatrixElement> </MatrixElement> nan 1e39 -1 65536 { } ( ) [1]".split()
 )
@@ -237,6 +442,15 @@ TARGETS = {
     "table": Target(table, seeds.tables, (*_NAMES, b"#", b"\n", b" ", b"\t", b"=", b"END_DATA")),
     "tiff": Target(tiff, seeds.tiffs),
     "picture": Target(picture, seeds.pictures, (b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND", b"iCCP")),
+    "template": Target(template, seeds.templates, _LANGUAGE),
+    "packed": Target(packed, seeds.packed),
+    "page": Target(page, seeds.page_profiles, (*_TYPES, *_OPERATORS, b"</script>", b"{{page}}", b"*/")),
+    "display": Target(device_profile, seeds.device_profiles, (*_TYPES, b"mft1", b"mft2", b"mAB ", b"para")),
+    "arguments": Target(arguments, seeds.arguments, (*_NAMES, b"=", b":", b"\n", b"litX", b"litI", b"nan")),
+    "fit": Target(fitted, seeds.fitted_tables, (*_NAMES, b"0", b"1e300", b"-1", b"1e-300", b"\n", b"89.9")),
+    "print": Target(print_job, seeds.print_jobs),
+    "exr": Target(exr, seeds.exrs, (b"channels", b"dataWindow", b"compression", b"chlist", b"box2i")),
+    "log": Target(log, seeds.logs, _NAMES),
     "job": Target(job, seeds.jobs, (*_NAMES, b"=", b"mm", b"dpi", b"%", b"\n", b"[[", b"'''", b"1979-05-27")),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import signal
 import time
@@ -13,7 +14,10 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import iccbrdf
 from fuzz.targets import Target, quietly
+
+_PACKAGE = Path(iccbrdf.__file__).parent
 
 MAX_SECONDS = 10
 """Processor time that an input may take."""
@@ -80,8 +84,9 @@ class Watch:
         self.worst_memory = max(self.worst_memory, memory if self.tried > 1 else 0)
 
     def _found(self, data: bytes, error: BaseException) -> None:
-        frames = traceback.extract_tb(error.__traceback__)
-        place = next((f"{f.filename}:{f.lineno}" for f in reversed(frames) if "iccbrdf" in f.filename), "?")
+        frames = reversed(traceback.extract_tb(error.__traceback__))
+        ours = (f for f in frames if f.filename.startswith(f"{_PACKAGE}{os.sep}"))
+        place = next((f"{os.path.relpath(f.filename, _PACKAGE.parent)}:{f.lineno}" for f in ours), "?")
         key = f"{type(error).__name__} at {place}"
         if key in self.findings:
             self.findings[key]["times"] += 1
