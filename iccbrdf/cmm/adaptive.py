@@ -52,8 +52,10 @@ _LEAST_PIECES = 8
 """Of a kind and with the same constants in a tile; fewer are not worth a call."""
 _SAMPLES = 4
 """Pixels of a piece that are looked at first."""
-_SIDE = 64
-"""Pixels that are compared with others at a time."""
+_SIDE, _WIDE = 64, 256
+"""Pixels that are compared with others at a time, in pieces and in what is one piece."""
+_BLOCK = 1 << 14
+"""Pixels that stay in the processor's cache from looking for the least values to the greatest."""
 _LOOKING = {"llvm": 300, "numpy": 20}
 """What it takes by back end to look at a pixel, in units of its additions: a kind has to spare more."""
 _MAX_KERNELS = 3
@@ -95,8 +97,12 @@ class _Statistics(NamedTuple):
     def of(cls, tile: Array, pieces: int) -> _Statistics:
         """Of pixels (n, channels) in a number of pieces that divides n; NaN where there is one."""
         n, channels = tile.shape
+        if pieces == 1 and n > _BLOCK:
+            blocks = [cls.of(tile[start : start + _BLOCK], 1) for start in range(0, n, _BLOCK)]
+            lows, highs = zip(*blocks, strict=True)
+            return cls(np.minimum.reduce(lows), np.maximum.reduce(highs))
         # Rows of many pixels, so that what runs innermost is long, and then those pixels one by one.
-        side = math.gcd(n // pieces, _SIDE)
+        side = math.gcd(n // pieces, _SIDE if pieces > 1 else _WIDE)
         rows = tile.reshape(pieces, -1, side * channels)
         found = []
         for extreme in (np.minimum, np.maximum):
