@@ -13,8 +13,8 @@ from conftest import SHARED
 from iccbrdf.brdf.geometry import planar
 from iccbrdf.brdf.models import MODELS, evaluate
 from iccbrdf.brdf.primaries import read_primaries, white_of, write_primaries
-from iccbrdf.brdf.records import to_json
 from iccbrdf.errors import InputError, UsageError
+from iccbrdf.json_text import to_json
 from iccbrdf.resources import folder
 
 ROOT = Path(__file__).resolve().parent.parent

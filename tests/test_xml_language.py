@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from xml_examples import a_profile, document
 
-from iccbrdf.calc.program import parse
+from iccbrdf.calc.program import Temporary, parse
 from iccbrdf.errors import InputError, LimitError, ProfileError, ProfileWarning, UsageError
 from iccbrdf.icc import (
     Calculator,
+    CompressedUtf8,
     Header,
     Matrix,
     Mluc,
@@ -19,7 +20,7 @@ from iccbrdf.icc import (
     Utf8,
     write_profile,
 )
-from iccbrdf.icc.source_tag import SIGNATURE, CalculatorSource, Temporary, read_sources, source_tag
+from iccbrdf.icc.source_tag import MAX_TEXT, SIGNATURE, CalculatorSource, Source, read_source
 from iccbrdf.icc.xml import language, profile_from_xml, profile_to_xml, read_xml
 
 
@@ -284,22 +285,25 @@ SOURCE = CalculatorSource(
     inputs=("kd.X", "kd X", "3D"),
     outputs=("X", "Y", "Z", "a", "b"),
     temporaries=(Temporary("half", 2, 3), Temporary("θ", 0)),
-    filename="model.calc",
-    source="model One\n\ninput kd\n",
+    templates=(("model One\n\ninput kd\n", "model.calc"), ("# -- θ --\n", "b.calc")),
+    constants={"table": ((1.0, 2.5), (0.1, -1e-30)), "white": (0.9,), "way": "up"},
+    effects={"gloss": True, "relief": False},
+    variables={"litI": 3.141592653589793},
 )
+RECIPE = {"model": "brdf1", "white": [0.9, 1.0, 0.8]}
 
 
 def with_names(*sources):
     tag = MultiProcess.of(Calculator(3, 5, parse(TEXT)))
-    return a_profile(A2B0=tag, **{SIGNATURE: source_tag(*sources)})
+    return a_profile(A2B0=tag, **{SIGNATURE: Source(sources, RECIPE).tag()})
 
 
 def test_names_come_back():
     profile = with_names(SOURCE)
-    assert read_sources(profile) == (SOURCE,)
-    assert read_sources(Profile.from_bytes(profile.to_bytes())) == (SOURCE,)
+    assert read_source(profile) == Source((SOURCE,), RECIPE)
+    assert read_source(Profile.from_bytes(profile.to_bytes())) == Source((SOURCE,), RECIPE)
     back = profile_from_xml(profile_to_xml(profile), strict=True)
-    assert read_sources(back) == (SOURCE,)
+    assert read_source(back) == Source((SOURCE,), RECIPE)
     assert back.to_bytes() == profile.to_bytes()
 
 
@@ -337,11 +341,21 @@ def test_a_broken_tag_hinders_nothing():
     "tag",
     [
         SignatureTag("abcd"),
+        CompressedUtf8(b"no zlib stream"),
+        CompressedUtf8.of("["),
         Utf8("["),
         Utf8("[" * 100_000),
         Utf8("[]"),
         Utf8('{"schema": "other/1"}'),
         Utf8('{"schema": "iccbrdf.source/1", "calculators": {}}'),
+        Utf8('{"schema": "iccbrdf.source/1", "recipe": []}'),
+        Utf8('{"schema": "iccbrdf.source/1", "calculators": [{"constants": {"a": 1}}]}'),
+        Utf8('{"schema": "iccbrdf.source/1", "calculators": [{"constants": {"a": [[1], 2]}}]}'),
+        Utf8('{"schema": "iccbrdf.source/1", "calculators": [{"constants": {"a": [NaN]}}]}'),
+        Utf8('{"schema": "iccbrdf.source/1", "calculators": [{"variables": {"a": true}}]}'),
+        Utf8(f'{{"schema": "iccbrdf.source/1", "calculators": [{{"variables": {{"a": 1{"0" * 400}}}}}]}}'),
+        Utf8('{"schema": "iccbrdf.source/1", "calculators": [{"effects": {"a": 1}}]}'),
+        Utf8('{"schema": "iccbrdf.source/1", "calculators": [{"templates": ["model x"]}]}'),
         Utf8('{"schema": "iccbrdf.source/1", "calculators": [{"tag": 1}]}'),
         Utf8('{"schema": "iccbrdf.source/1", "calculators": [{"tag": "A2B0", "inputs": [1]}]}'),
         Utf8('{"schema": "iccbrdf.source/1", "calculators": [{"temporaries": [["a", 65536, 1]]}]}'),
@@ -351,7 +365,16 @@ def test_a_broken_tag_hinders_nothing():
 )
 def test_a_broken_tag_is_a_profile_error(tag):
     with pytest.raises(ProfileError, match="tag bsrc: "):
-        read_sources(a_profile(bsrc=tag))
+        read_source(a_profile(bsrc=tag))
+
+
+@pytest.mark.parametrize("tag", [CompressedUtf8.of("[" * (MAX_TEXT + 1)), Utf8(" " * (MAX_TEXT + 1))])
+def test_a_tag_that_unpacks_to_too_much_is_refused(tag):
+    profile = a_profile(A2B0=MultiProcess.of(Calculator(1, 1, parse("1 out(0)"))), bsrc=tag)
+    with pytest.raises(LimitError, match="tag bsrc: .*more than 1048576"):
+        read_source(profile)
+    with pytest.warns(ProfileWarning, match="programs are written without names"):
+        profile_to_xml(profile)
 
 
 def test_slots_have_one_name():

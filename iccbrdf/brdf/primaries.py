@@ -20,15 +20,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from iccbrdf.brdf.cook_torrance import M_MIN
 from iccbrdf.brdf.geometry import Array
 from iccbrdf.brdf.models import MODELS, Model
-from iccbrdf.brdf.records import Record, read_record, to_json
+from iccbrdf.brdf.records import Record, read_record
 from iccbrdf.errors import InputError
 from iccbrdf.files import StrPath, atomic_output
+from iccbrdf.json_text import to_json
 
 SCHEMA = "iccbrdf-primaries"
 VERSION = 1
@@ -118,7 +120,7 @@ def read_primaries(path: StrPath) -> Primaries:
     record.check_keys([*keys, "encoding", "primaries"])
     illuminant = record.choice("illuminant", ILLUMINANTS)
     observer = record.choice("observer", OBSERVERS)
-    encoding = _read_encoding(record, model)
+    encoding = read_encoding(record, model)
     return Primaries(
         model=model.name,
         illuminant=illuminant,
@@ -126,7 +128,7 @@ def read_primaries(path: StrPath) -> Primaries:
         white=read_white(record, illuminant, observer),
         geometry=record.text("geometry"),
         source=record.text("source"),
-        primaries=_read_entries(record, model, encoding),
+        primaries=read_entries(record, model, encoding),
         encoding=encoding,
         refractive_index=(
             record.number("refractive_index", 1) if "refractive_index" in record.values else REFRACTIVE_INDEX
@@ -173,6 +175,32 @@ def write_primaries(primaries: Primaries, path: StrPath, *, overwrite: bool = Fa
         The file cannot be written, or exists and `overwrite` is not set.
     """
     model = MODELS[primaries.model]
+    contents = {
+        "schema": SCHEMA,
+        "version": VERSION,
+        "model": model.name,
+        **({"refractive_index": primaries.refractive_index} if model.has_fresnel else {}),
+        "illuminant": primaries.illuminant,
+        "observer": primaries.observer,
+        "white": list(primaries.white),
+        "geometry": primaries.geometry,
+        "source": primaries.source,
+        "encoding": encoding_of(primaries),
+        "primaries": entries_of(primaries),
+    }
+    with atomic_output(path, overwrite=overwrite) as temporary:
+        temporary.write_bytes(f"{to_json(contents)}\n".encode())
+
+
+def encoding_of(primaries: Primaries) -> dict[str, float]:
+    """Return what stands under `encoding` in a primaries file."""
+    families = MODELS[primaries.model].parameters
+    return {family: primaries.encoding.get(family, 1.0) for family, _ in families}
+
+
+def entries_of(primaries: Primaries) -> list[dict[str, Any]]:
+    """Return what stands under `primaries` in a primaries file."""
+    model = MODELS[primaries.model]
     entries = []
     for primary in primaries.primaries:
         families = model.split(primary.parameters)
@@ -187,21 +215,7 @@ def write_primaries(primaries: Primaries, path: StrPath, *, overwrite: bool = Fa
                 },
             }
         )
-    contents = {
-        "schema": SCHEMA,
-        "version": VERSION,
-        "model": model.name,
-        **({"refractive_index": primaries.refractive_index} if model.has_fresnel else {}),
-        "illuminant": primaries.illuminant,
-        "observer": primaries.observer,
-        "white": list(primaries.white),
-        "geometry": primaries.geometry,
-        "source": primaries.source,
-        "encoding": {family: primaries.encoding.get(family, 1.0) for family, _ in model.parameters},
-        "primaries": entries,
-    }
-    with atomic_output(path, overwrite=overwrite) as temporary:
-        temporary.write_bytes(f"{to_json(contents)}\n".encode())
+    return entries
 
 
 def white_of(illuminant: str, observer: str) -> tuple[float, float, float]:
@@ -233,7 +247,8 @@ def read_white(record: Record, illuminant: str, observer: str) -> tuple[float, .
     return white
 
 
-def _read_encoding(record: Record, model: Model) -> dict[str, float]:
+def read_encoding(record: Record, model: Model) -> dict[str, float]:
+    """Return the encoding that a file states, or else 1 for each family."""
     if "encoding" not in record.values:
         return {family: 1.0 for family, _ in model.parameters}
     encoding = record.record("encoding")
@@ -244,7 +259,8 @@ def _read_encoding(record: Record, model: Model) -> dict[str, float]:
     }
 
 
-def _read_entries(record: Record, model: Model, encoding: Mapping[str, float]) -> tuple[Primary, ...]:
+def read_entries(record: Record, model: Model, encoding: Mapping[str, float]) -> tuple[Primary, ...]:
+    """Return the primaries of a file; errors as those of `read_primaries`."""
     entries: dict[str, Primary] = {}
     for entry in record.records("primaries", "primary"):
         entry.check_keys(["name", "CMYK", "XYZ", "parameters"])

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from iccbrdf.errors import InputError, nearest
-from iccbrdf.files import StrPath, read_whole
+from iccbrdf.files import StrPath, as_text, read_whole
 
 MAX_BYTES = 1 << 24
 """Of a JSON file, which takes up to thirty times its bytes in memory."""
@@ -49,6 +49,9 @@ class Record:
         value: str = self.get(key, str, "a text")
         if not value.strip():
             raise self.error(f"{key} is empty, expected a text")
+        # JSON may name half of a surrogate pair, which no file can hold.
+        if as_text(value) != value:
+            raise self.error(f"{key} is {value!r}, expected Unicode text")
         return value
 
     def choice(self, key: str, valid: Iterable[str]) -> str:
@@ -132,27 +135,6 @@ def read_record(path: StrPath, schema: str, version: int) -> Record:
     if record.number("version", 1) != version:
         raise record.error(f"version is {values['version']}, expected {version}")
     return record
-
-
-def to_json(value: object, indent: str = "") -> str:
-    """
-    Return JSON that reads well: what fits on a line of 100 characters stands on one.
-
-    The same value gives the same text; numbers are written with as many digits as bring them back exactly.
-    """
-    line = json.dumps(value, ensure_ascii=False, allow_nan=False)
-    if len(indent) + len(line) <= 100 or not isinstance(value, dict | list):
-        return line
-    inner = indent + "  "
-    if isinstance(value, dict):
-        items = [
-            f"{json.dumps(key, ensure_ascii=False)}: {to_json(item, inner)}" for key, item in value.items()
-        ]
-        start, end = "{}"
-    else:
-        items = [to_json(item, inner) for item in value]
-        start, end = "[]"
-    return f"{start}\n{inner}" + f",\n{inner}".join(items) + f"\n{indent}{end}"
 
 
 def _join(place: str, name: str) -> str:

@@ -23,7 +23,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,9 +32,10 @@ from iccbrdf.brdf.colour_difference import XYZ_to_Lab, delta_E_CIE2000
 from iccbrdf.brdf.cook_torrance import channels
 from iccbrdf.brdf.geometry import Array
 from iccbrdf.brdf.primaries import ILLUMINANTS, OBSERVERS, read_white
-from iccbrdf.brdf.records import Record, read_record, to_json
+from iccbrdf.brdf.records import Record, read_record
 from iccbrdf.errors import UsageError, nearest
 from iccbrdf.files import StrPath, atomic_output
+from iccbrdf.json_text import to_json
 
 SCHEMA = "iccbrdf-slopes"
 VERSION = 1
@@ -257,7 +258,7 @@ def read_slopes(path: StrPath) -> Slopes:
         white=read_white(record, illuminant, observer),
         geometry=record.text("geometry"),
         source=record.text("source"),
-        slopes=_read_entries(record),
+        slopes=read_entries(record),
         file=record.file,
     )
 
@@ -279,13 +280,19 @@ def write_slopes(slopes: Slopes, path: StrPath, *, overwrite: bool = False) -> N
         "white": list(slopes.white),
         "geometry": slopes.geometry,
         "source": slopes.source,
-        "slopes": [{"angle": slope.angle, "W": list(slope.W), "B": list(slope.B)} for slope in slopes.slopes],
+        "slopes": entries_of(slopes),
     }
     with atomic_output(path, overwrite=overwrite) as temporary:
         temporary.write_bytes(f"{to_json(contents)}\n".encode())
 
 
-def _read_entries(record: Record) -> tuple[Slope, ...]:
+def entries_of(slopes: Slopes) -> list[dict[str, Any]]:
+    """Return what stands under `slopes` in a slopes file."""
+    return [{"angle": slope.angle, "W": list(slope.W), "B": list(slope.B)} for slope in slopes.slopes]
+
+
+def read_entries(record: Record) -> tuple[Slope, ...]:
+    """Return the slopes of a file; errors as those of `read_slopes`."""
     slopes: list[Slope] = []
     for entry in record.records("slopes", "slope"):
         entry.check_keys(["angle", "W", "B"])

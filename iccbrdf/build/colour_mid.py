@@ -17,14 +17,16 @@ from numpy.typing import ArrayLike
 from iccbrdf.brdf.interpolation import InterpolationMethod, interpolate
 from iccbrdf.brdf.models import MODELS as SCIENCE
 from iccbrdf.brdf.models import NORMAL
-from iccbrdf.brdf.primaries import Primaries, check_nodes
+from iccbrdf.brdf.primaries import Primaries, check_nodes, encoding_of, entries_of
 from iccbrdf.brdf.slopes import Slopes, published_jumps
+from iccbrdf.brdf.slopes import entries_of as slope_entries_of
 from iccbrdf.brdf.smooth_interpolation import SmoothMap
 from iccbrdf.build.effects import chosen_effects, effect_names
 from iccbrdf.build.models import MODELS
 from iccbrdf.build.private_tags import IMAGE_TAG, SLOPES_TAG, image_encoding
 from iccbrdf.build.profiles import decoding, device_channels, ranges, text_tags
 from iccbrdf.build.slope_adjustment import TEMPLATE, check_slopes, slope_constants
+from iccbrdf.build.source import calculator_source, source_tags
 from iccbrdf.calc import Compiled, compile_chain
 from iccbrdf.calc import listing as program_listing
 from iccbrdf.errors import UsageError, nearest
@@ -69,6 +71,7 @@ def build_colour_mid(
     reference: ArrayLike | None = None,
     device: Sequence[str] | None = None,
     note: str = "",
+    with_source: bool = True,
 ) -> ColourMid:
     """Build the colour MID of a set of primaries.
 
@@ -95,6 +98,8 @@ def build_colour_mid(
         Device channels, where an image has more than the effects call for; default: no more.
     note
         What the description says besides.
+    with_source
+        Whether the profile holds what it is made from (`iccbrdf.icc.source_tag`).
 
     Raises
     ------
@@ -118,6 +123,18 @@ def build_colour_mid(
     if slopes is None and effects is not None and "slope" in effect_names(effects):
         raise UsageError("the effect 'slope' is asked for, but there are no slopes, which it needs")
     chosen = chosen_effects(primaries.model, effects, without)
+    recipe = {
+        "model": primaries.model,
+        "illuminant": primaries.illuminant,
+        "observer": primaries.observer,
+        "white": list(primaries.white),
+        "encoding": encoding_of(primaries),
+        "primaries": entries_of(primaries),
+        **({"slopes": slope_entries_of(slopes), "slope_method": slope_method} if slopes is not None else {}),
+        "interpolation": interpolation,
+        **({"p": p, "exponent": exponent} if interpolation == "published" else {}),
+        "without": [name for name in ("slope", "interpolation") if not chosen[name]],
+    }
     if not chosen["slope"]:
         slopes = None
     model = MODELS[primaries.model]
@@ -146,8 +163,11 @@ def build_colour_mid(
     adjustment = f"{slope_method} slope adjustment" if slopes is not None else "no slope adjustment"
     means = f"{interpolation} interpolation" if chosen["interpolation"] else "one gloss"
     title = f"{model.title}, {means}, {adjustment}{note}"
+    mid = _mid(compiled, title, primaries, slopes, device_channels(device, compiled.inputs))
+    if with_source:
+        mid = mid.replace(tags=source_tags(recipe, calculator_source(compiled, "A2M0", 1)))
     return ColourMid(
-        mid=_mid(compiled, title, primaries, slopes, device_channels(device, compiled.inputs)),
+        mid=mid,
         listing="\n".join(_lines(compiled, title, slopes)) + "\n",
         compiled=compiled,
         effects={"slope": slopes is not None, "interpolation": chosen["interpolation"]},
@@ -214,4 +234,4 @@ def _lines(compiled: Compiled, title: str, slopes: Slopes | None) -> Iterator[st
     yield ""
     yield from compiled.documentation.splitlines()
     yield ""
-    yield program_listing(compiled.program)
+    yield program_listing(compiled.program, compiled.temporaries)

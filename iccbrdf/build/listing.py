@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from iccbrdf.build.viewing import Viewing
 from iccbrdf.calc import Compiled
 from iccbrdf.calc import listing as program_listing
+from iccbrdf.icc.source_tag import setting_text
 
 
 def listing(
@@ -34,8 +35,7 @@ def _lines(
         yield f"    {name:<5} {value:.9g}"
     yield "  constants"
     for name, constant in compiled.constants.items():
-        text = constant if isinstance(constant, str) else " ".join(f"{value:g}" for value in constant)
-        yield f"    {name} = {text}"
+        yield f"    {name} = {setting_text(constant)}"
     for state, heading in ((True, "effects simulated"), (False, "effects left out")):
         names = [name.replace("_", "-") for name, on in compiled.effects.items() if on is state]
         yield f"  {heading}: {', '.join(names) or 'none'}"
@@ -47,4 +47,4 @@ def _lines(
     yield ""
     yield from compiled.documentation.splitlines()
     yield ""
-    yield program_listing(compiled.program)
+    yield program_listing(compiled.program, compiled.temporaries)

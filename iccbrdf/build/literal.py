@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from iccbrdf.build.models import MODELS
-from iccbrdf.build.pair import Pair
+from iccbrdf.build.pair import PROGRAM_TAG, Pair
+from iccbrdf.build.source import calculator_source, source_tags
 from iccbrdf.calc import Compiled, compile_template
 from iccbrdf.icc import Calculator, MultiProcess, Profile
 from iccbrdf.resources import folder
@@ -22,4 +23,5 @@ def literal_mvis(pair: Pair, model: str) -> tuple[Profile, Compiled]:
         variables=pair.compiled.variables,
     )
     program = Calculator(inputs=len(compiled.inputs), outputs=3, program=compiled.program)
-    return pair.mvis.replace(tags={"M2B0": MultiProcess.of(program)}), compiled
+    source = source_tags({}, calculator_source(compiled, PROGRAM_TAG))
+    return pair.mvis.replace(tags={PROGRAM_TAG: MultiProcess.of(program), **source}), compiled

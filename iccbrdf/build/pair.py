@@ -12,16 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from iccbrdf.brdf.primaries import Primaries
+from iccbrdf.brdf.primaries import Primaries, encoding_of
 from iccbrdf.build.effects import EFFECTS, MVIS, chosen_effects
 from iccbrdf.build.listing import listing
 from iccbrdf.build.models import MODELS, Model
 from iccbrdf.build.profiles import Range, decoding, device_channels, ranges, text_tags
+from iccbrdf.build.source import calculator_source, source_tags
 from iccbrdf.build.viewing import Viewing, viewing
 from iccbrdf.calc import Compiled, compile_template
 from iccbrdf.errors import UsageError, nearest
 from iccbrdf.icc import XYZ, Calculator, ColorantTable, Header, MultiProcess, NumberArray, Profile
 from iccbrdf.resources import folder
+
+PROGRAM_TAG = "M2B0"
+"""The tag of an MVIS that holds the model."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,7 @@ def build_pair(
     variables: Mapping[str, float] | None = None,
     device: Sequence[str] | None = None,
     note: str = "",
+    with_source: bool = True,
 ) -> Pair:
     """Build the profiles of the model, the viewing conditions and the encoding that `primaries` states.
 
@@ -74,6 +79,8 @@ def build_pair(
         Device channels of the MID, where an image has more than the effects call for; default: no more.
     note
         What the descriptions say besides.
+    with_source
+        Whether the profiles hold what they are made from (`iccbrdf.icc.source_tag`).
 
     Raises
     ------
@@ -111,6 +118,19 @@ def build_pair(
     title = f"{model.title}{note}"
     mid = _mid(compiled.inputs, limits, device_channels(device, compiled.inputs), title)
     mvis = _mvis(compiled, conditions, title)
+    if with_source:
+        mid = mid.replace(tags=source_tags({"model": primaries.model, "encoding": encoding_of(primaries)}))
+        recipe = {
+            "model": primaries.model,
+            **({"refractive_index": primaries.refractive_index} if model.has_refractive_index else {}),
+            "illuminant": primaries.illuminant,
+            "observer": primaries.observer,
+            "white": list(primaries.white),
+            **({"fresnel_angle": fresnel_angle} if fresnel_angle is not None else {}),
+            "variables": dict(variables),
+            "without": [name for name, on in chosen.items() if not on],
+        }
+        mvis = mvis.replace(tags=source_tags(recipe, calculator_source(compiled, PROGRAM_TAG)))
     return Pair(mid, mvis, listing(title, compiled, limits, conditions), compiled, chosen)
 
 
@@ -138,7 +158,7 @@ def _mvis(compiled: Compiled, conditions: Viewing, name: str) -> Profile:
         **text_tags(f"MVIS for {name}, {conditions.text}", compiled.inputs),
         "mdv ": NumberArray("fl32", np.array(compiled.defaults)),
         "wtpt": XYZ.of(*conditions.white),
-        "M2B0": MultiProcess(n, 3, (program,)),
+        PROGRAM_TAG: MultiProcess(n, 3, (program,)),
     }
     if conditions.svcn is not None:
         tags |= {

@@ -25,13 +25,17 @@ class _Compressed(Record):
     @property
     def text(self) -> str:
         """The text; ProfileError where the data is no compressed UTF-8, LimitError beyond MAX_TEXT bytes."""
+        return self.unpacked(MAX_TEXT)
+
+    def unpacked(self, most: int) -> str:
+        """The text, which may have so many bytes; errors as those of `text`."""
         unpacker = zlib.decompressobj()
         try:
-            plain = unpacker.decompress(self.data, MAX_TEXT)
+            plain = unpacker.decompress(self.data, most)
         except zlib.error as error:
             raise ProfileError(f"{self.signature}: the text cannot be unpacked: {error}") from None
         if unpacker.unconsumed_tail:
-            raise LimitError(f"{self.signature}: more than {MAX_TEXT} bytes of text when unpacked")
+            raise LimitError(f"{self.signature}: more than {most} bytes of text when unpacked")
         if not unpacker.eof:
             raise ProfileError(f"{self.signature}: the compressed text ends before its end")
         try:
@@ -77,6 +81,17 @@ class CompressedXml(_Compressed):
     def of(cls, text: str) -> CompressedXml:
         """The tag of a text."""
         return cls(_compress(text))
+
+
+@TAGS.add("ZXML")
+@dataclass(frozen=True, eq=False)
+class VendorXml(CompressedXml):
+    """The same under the signature that X-Rite gives it, in tags for CxF."""
+
+    data: bytes
+
+    signature = "ZXML"
+    layout = tag_layout(signature, Field("data", Bytes()))
 
 
 @TAGS.add("ehim")

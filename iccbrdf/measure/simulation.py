@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from iccbrdf.brdf.records import to_json
 from iccbrdf.brdf.slopes import Slope, Slopes, write_slopes
 from iccbrdf.files import atomic_output
+from iccbrdf.json_text import to_json
 from iccbrdf.measure import fogra39
 from iccbrdf.measure.goniometer import LAMP_EXCLUSIONS, Sensor, measure
 from iccbrdf.measure.measurements import Measurements

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from iccbrdf.calc.program import Program, listing, parse
+from iccbrdf.calc.program import SLOTS, Program, listing, parse
 from iccbrdf.errors import LimitError, ProfileError
 from iccbrdf.icc.elements import Calculator
-from iccbrdf.icc.source_tag import SLOTS, CalculatorSource
+from iccbrdf.icc.source_tag import CalculatorSource
 from iccbrdf.icc.xml import node as xml
 from iccbrdf.icc.xml.elements import CHANNELS, ELEMENT_FORMS
 from iccbrdf.icc.xml.forms import Form, Part, Seen
@@ -167,6 +167,8 @@ class _Reading:
 
 
 def _write_names(out: Target, names: CalculatorSource) -> None:
+    if names.templates:
+        out.comment("\n".join(names.lines()))
     for attribute, channels in (("InputNames", names.inputs), ("OutputNames", names.outputs)):
         if channels:
             out.set(attribute, " ".join(identifiers(channels)))

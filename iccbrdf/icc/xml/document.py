@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import os
-import warnings
 from pathlib import Path
 from typing import Any
 
 from lxml import etree
 
-from iccbrdf.errors import ProfileError, ProfileWarning, UsageError
-from iccbrdf.icc.elements import MultiProcess
+from iccbrdf.errors import ProfileError, UsageError
 from iccbrdf.icc.profile import Profile
-from iccbrdf.icc.source_tag import CalculatorSource, read_sources
+from iccbrdf.icc.source_tag import readable_source
 from iccbrdf.icc.xml import calculator, luts, tags  # noqa: F401  (they add their forms to the tables)
 from iccbrdf.icc.xml.composite import NamedTags
 from iccbrdf.icc.xml.header import HEADER
@@ -40,7 +38,9 @@ def profile_to_xml(profile: Profile) -> bytes:
     """
     records = {signature: profile[signature] for signature in profile}
     root = etree.Element("IccProfile")
-    out = Target(root, Job(profile.source, _names(profile)))
+    source = readable_source(profile, profile.source)
+    names = {id(element): one for element, one in source.found_in(profile)}
+    out = Target(root, Job(profile.source, names))
     try:
         HEADER.write(out.child("Header"), profile.header)
     except ValueError as error:
@@ -48,24 +48,6 @@ def profile_to_xml(profile: Profile) -> bytes:
     _TAGS.write(out.child("Tags"), records)
     etree.indent(root)
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8")) + b"\n"
-
-
-def _names(profile: Profile) -> dict[int, CalculatorSource]:
-    """The names of calculators, by the `id` of their records; a broken private tag hinders nothing."""
-    try:
-        sources = read_sources(profile)
-    except ProfileError as error:
-        warnings.warn(f"{profile.source}: {error}; programs are written without names", ProfileWarning, 3)
-        return {}
-    names = {}
-    for source in sources:
-        tag = profile.get(source.tag)
-        if not isinstance(tag, MultiProcess) or not 0 <= source.element < len(tag.elements):
-            continue
-        element = tag.elements[source.element]
-        if len(source.inputs) <= element.inputs and len(source.outputs) <= element.outputs:
-            names[id(element)] = source
-    return names
 
 
 def profile_from_xml(

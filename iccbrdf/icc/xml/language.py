@@ -15,8 +15,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from iccbrdf.calc.operators import OPERATORS, Operand
+from iccbrdf.calc.program import SLOTS
 from iccbrdf.errors import IccBrdfError, LimitError, ProfileError, nearest
-from iccbrdf.icc.source_tag import SLOTS, CalculatorSource
+from iccbrdf.icc.source_tag import CalculatorSource
 from iccbrdf.icc.xml.node import Node
 from iccbrdf.icc.xml.values import Codec
 

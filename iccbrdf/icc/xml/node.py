@@ -248,6 +248,13 @@ class Target:
         except ValueError:
             raise self.error(f"{name}: found {value!r}, a character that XML cannot hold") from None
 
+    def comment(self, text: str) -> None:
+        """Put a comment at its end; two hyphens, and what XML cannot hold, become other characters."""
+        plain = "".join(c if c.isprintable() or c == "\n" else " " for c in text)
+        plain = plain.replace("--", "\u2010\u2010")
+        self.job.spend(self, len(plain) + 9)
+        self.element.append(etree.Comment(f" {plain} "))
+
     def write(self, text: str) -> None:
         """Give it its text."""
         if len(text) > MAX_TEXT:
