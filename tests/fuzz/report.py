@@ -38,7 +38,7 @@ def markdown(results: Mapping[str, Mapping[str, Any]]) -> str:
         "# Fuzzing",
         "",
         f"{totals['inputs']:,} inputs in {totals['seconds'] / 60:.0f} minutes ({platform.machine()}, Python "
-        f"{platform.python_version()}). The worst took {totals['worst_seconds']:.1f} s of processor time, and "
+        f"{platform.python_version()}). The worst took {totals['worst_seconds']:.1f} s of processor, and "
         f"{totals['worst_memory_mib']} MiB more than any before it. Findings: {len(found) or 'none'}.",
         "",
         "An input is a finding if anything but the documented errors comes of it, if it takes more than "
