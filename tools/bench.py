@@ -248,6 +248,9 @@ def reduced(place: Path) -> list[Row]:
                 1.3 if goal else None, True),
             Row(f"{name}, LLVM", "published interpolation + Cook-Torrance", llvm / seconds["published, llvm"],
                 0.25 if goal else None, True),
+            Row(f"{name}, planning", "reading the image and decoding it",
+                sum(scene.planning.values()) / (scene.planning["reading"] + scene.planning["decoding"]),
+                None, figures=scene.planning),
         ]  # fmt: skip
     return rows
 
