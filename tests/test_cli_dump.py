@@ -2,8 +2,9 @@
 
 import pytest
 
-from iccbrdf.calc import listing
-from iccbrdf.icc import read_profile
+from iccbrdf.calc import listing, parse
+from iccbrdf.icc import CompressedUtf8, read_profile, write_profile
+from iccbrdf.icc.source_tag import read_source
 from iccbrdf.resources import folder
 
 MVIS = folder("profiles") / "fogra39_gloss" / "mvis.icc"
@@ -16,8 +17,10 @@ def test_text_shows_header_tags_and_program(run):
     assert "device_class      mvis" in lines
     for tag in ("desc", "mcta", "mdv", "wtpt", "M2B0"):
         assert tag in lines
-    program = read_profile(MVIS)["M2B0"].elements[0].program
-    for line in listing(program).splitlines():
+    profile = read_profile(MVIS)
+    program = profile["M2B0"].elements[0].program
+    (calculator,) = read_source(profile).calculators
+    for line in listing(program, calculator.temporaries).splitlines():
         assert line.strip() in lines
 
 
@@ -29,7 +32,33 @@ def test_json(run):
     assert dumped["header"]["device_class"] == "mvis"
     assert dumped["tags"]["wtpt"]["size"] == 20
     program = read_profile(MVIS)["M2B0"].elements[0].program
-    assert dumped["tags"]["M2B0"]["elements"][0]["program"] == listing(program).splitlines()
+    lines = dumped["tags"]["M2B0"]["elements"][0]["program"]
+    assert parse("\n".join(lines)) == program
+    assert [line.split("% ")[1] for line in lines if "%" in line][:3] == ["n i", "v", "cos_i cos_v"]
+
+
+def test_what_a_profile_is_compiled_from_comes_back(run):
+    template = (folder("calc_templates") / "cook_torrance.calc").read_text().splitlines()
+    lines = run("dump", MVIS).out.splitlines()
+    source = [line.removeprefix("  ") for line in lines[lines.index("source of tag M2B0, element 0") + 1 :]]
+    start = source.index("cook_torrance.calc:") + 1
+    assert source[start : start + len(template)] == template
+    assert "inputs kd.X kd.Y kd.Z ks.X ks.Y ks.Z m n.x n.y n.z" in source
+    assert {"outputs X Y Z", "fresnel_angle = theta_i", "white = 0.9642 1 0.8249"} <= set(source)
+    assert {"fresnel = on", "chromatic_roughness = off"} <= set(source)
+    assert "litX = -0.707107 where it is not set" in source
+    made_from = run("dump", MVIS, "--json").json["made_from"]
+    assert made_from["calculators"][0]["templates"][0]["source"][:-1] == template
+    assert made_from["recipe"]["refractive_index"] == 1.5
+
+
+def test_a_source_that_cannot_be_read_hinders_nothing(run, tmp_path):
+    path = tmp_path / "odd.icc"
+    write_profile(read_profile(MVIS).replace(tags={"bsrc": CompressedUtf8.of("{")}), path)
+    result = run("dump", path)
+    assert result.code == 0
+    assert "tag bsrc: " in result.err
+    assert "source of" not in result.out
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,9 @@ from iccbrdf.errors import UsageError, nearest
 from iccbrdf.icc import XYZ, Calculator, ColorantTable, Header, MultiProcess, NumberArray, Profile
 from iccbrdf.resources import folder
 
+FRESNEL_ANGLES = ("theta_i", "alpha")
+"""Of incidence, or between half vector and view."""
+
 PROGRAM_TAG = "M2B0"
 """The tag of an MVIS that holds the model."""
 

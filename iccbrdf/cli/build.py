@@ -11,6 +11,7 @@ import click
 from iccbrdf.brdf.primaries import MIN_NODES, read_primaries
 from iccbrdf.brdf.slopes import read_slopes
 from iccbrdf.build import GRIDS, INTERPOLATIONS, SLOPE_METHODS, ColourMid, build_tables
+from iccbrdf.build.pair import FRESNEL_ANGLES
 from iccbrdf.build.recipe import Recipe
 from iccbrdf.cli.options import (
     FiniteRange,
@@ -73,7 +74,10 @@ Examples:
               help="With --for, instead of --tolerance: the quickest profiles whose proof is within this "
               "CIEDE2000, as measured on the image (see iccbrdf cost).")  # fmt: skip
 @plan_options
-@click.option("--fresnel-angle", type=click.Choice(("theta_i", "alpha")),
+@click.option("--no-source", is_flag=True,
+              help="Leave out of the profiles what they are made from (templates, settings, names), which "
+              "iccbrdf dump shows and iccbrdf plan takes.  They are then half as large.")  # fmt: skip
+@click.option("--fresnel-angle", type=click.Choice(FRESNEL_ANGLES),
               help="Angle of the Fresnel term: of incidence, as printed (the default), or between half "
               "vector and view, which keeps the model reciprocal.")  # fmt: skip
 @scene_options
@@ -96,6 +100,7 @@ def command(
     tolerance: float,
     samples: Samples | None,
     channels: str | None,
+    no_source: bool,
     fresnel_angle: str | None,
     light: str | None,
     view: str | None,
@@ -133,6 +138,7 @@ def command(
         exponent,
         fresnel_angle,
         environment(light, view, env),
+        with_source=not no_source,
     )
     if image is None and (lights or tolerance or samples or channels or budget is not None):
         raise UsageError("--budget, --lights, --tolerance, --samples and --channels belong to --for")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,11 @@ from iccbrdf.brdf.primaries import read_primaries
 from iccbrdf.brdf.slopes import read_slopes
 from iccbrdf.build import INTERPOLATIONS, SLOPE_METHODS
 from iccbrdf.build.effects import EFFECTS
-from iccbrdf.build.recipe import Recipe
+from iccbrdf.build.recipe import Recipe, left_out, recipe_of
 from iccbrdf.build.spans import Directions
 from iccbrdf.cli.options import emit, environment, json_option, name_list, plan_options, scene_options
 from iccbrdf.errors import UsageError
+from iccbrdf.icc import read_profile
 from iccbrdf.images import Samples, open_tiff
 from iccbrdf.planning import Check, Planning, ScenePlan, check_image
 from iccbrdf.scene import LIGHT, VIEW, parse_direction, parse_number
@@ -30,6 +32,7 @@ EPILOG = """
 \b
 Examples:
   What a print calls for, lit from the left and seen from above:
+    iccbrdf plan relief.tif -p mid.icc -p mvis.icc --light 50,180
     iccbrdf plan relief.tif --primaries primaries.json --light 50,180
   For a light that goes round, where CIEDE2000 of 0.5 may be lost:
     iccbrdf plan relief.tif --primaries primaries.json --lights 60,0:60,360 --tolerance 0.5
@@ -40,20 +43,24 @@ Examples:
 
 @click.command("plan", epilog=EPILOG)
 @click.argument("image", type=click.Path(path_type=Path))
-@click.option("--primaries", required=True, type=click.Path(path_type=Path),
-              help="The primaries file that the profiles are made of.")  # fmt: skip
+@click.option("-p", "--profile", "profiles", multiple=True, type=click.Path(path_type=Path),
+              help="A profile that the image is for: the MID or colour MID, then the MVIS.")  # fmt: skip
+@click.option("--primaries", type=click.Path(path_type=Path),
+              help="Instead of profiles: the primaries file that they are made of.")  # fmt: skip
 @click.option("--slopes", type=click.Path(path_type=Path), help="The slopes file, for an image of XYZ.")
-@click.option("--slope-method", type=click.Choice(SLOPE_METHODS), default="affine", show_default=True)
-@click.option("--interpolation", type=click.Choice(INTERPOLATIONS), default="smooth", show_default=True)
+@click.option("--slope-method", type=click.Choice(SLOPE_METHODS), help="affine (default) or as published.")
+@click.option("--interpolation", type=click.Choice(INTERPOLATIONS),
+              help="smooth (default) or as published.")  # fmt: skip
 @plan_options
 @scene_options
 @json_option
 def command(
     image: Path,
-    primaries: Path,
+    profiles: tuple[Path, ...],
+    primaries: Path | None,
     slopes: Path | None,
-    slope_method: str,
-    interpolation: str,
+    slope_method: str | None,
+    interpolation: str | None,
     lights: tuple[str, ...],
     tolerance: float,
     samples: Samples | None,
@@ -68,17 +75,39 @@ def command(
     The image is a TIFF for the binding MID (BRDF parameters and normals) or for the colour MID (XYZ and
     normals).  For each effect, a bound tells how far the proof without it is from the full one at most, over
     all pixels and lights; what stays below the tolerance can be left out.
+
+    Profiles of iccbrdf build say what they are made of.  Of those that were built without some effects, the
+    plan is that of all effects, and tells which of those that are lacking the image calls for.
     """
-    recipe = Recipe(
-        read_primaries(primaries),
-        read_slopes(slopes) if slopes is not None else None,
-        interpolation,
-        slope_method,
-        variables=environment(light, view, env),
-    )
+    chain = [read_profile(path) for path in profiles]
+    if (primaries is None) != bool(chain):
+        raise UsageError("give the profiles that the image is for (-p MID -p MVIS), or --primaries")
+    if primaries is not None:
+        recipe = Recipe(
+            read_primaries(primaries),
+            read_slopes(slopes) if slopes is not None else None,
+            interpolation or "smooth",
+            slope_method or "affine",
+        )
+    elif slopes is not None or slope_method is not None or interpolation is not None:
+        raise UsageError("--slopes, --slope-method and --interpolation belong to --primaries")
+    else:
+        recipe = recipe_of(chain)
+    recipe = replace(recipe, variables={**recipe.variables, **environment(light, view, env)})
     plan, check = planned(image, recipe, lights, tolerance, samples, channels)
-    result = {"image": str(image), "primaries": str(primaries), **plan_result(plan, check)}
-    emit(as_json, "iccbrdf.plan/1", result, "\n".join([f"{image}:", *plan_lines(plan, check)]))
+    gone = left_out(chain)
+    lacking = [finding.effect for finding in plan.findings if finding.called_for and finding.effect in gone]
+    result = {
+        "image": str(image),
+        "profiles": [str(path) for path in profiles],
+        "primaries": None if primaries is None else str(primaries),
+        **plan_result(plan, check),
+        "lacking": lacking,
+    }
+    text = [f"{image}:", *plan_lines(plan, check)]
+    if lacking:
+        text.append(f"  the profiles lack what is called for: {', '.join(lacking)}")
+    emit(as_json, "iccbrdf.plan/1", result, "\n".join(text))
 
 
 def planned(

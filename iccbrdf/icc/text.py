@@ -111,7 +111,7 @@ def _number(value: Any) -> Any:
 
 def _lines(data: dict[str, Any], indent: str) -> Iterator[str]:
     for key, value in data.items():
-        name = _printable(key)
+        name = printable(key)
         if isinstance(value, dict):
             yield f"{indent}{name}"
             yield from _lines(value, indent + "  ")
@@ -122,12 +122,12 @@ def _lines(data: dict[str, Any], indent: str) -> Iterator[str]:
                     yield f"{indent}  [{index}]"
                     yield from _lines(item, indent + "    ")
                 else:
-                    yield f"{indent}  {_printable(item)}"
+                    yield f"{indent}  {printable(item)}"
         else:
-            yield f"{indent}{name:<18}{_printable(value)}"
+            yield f"{indent}{name:<18}{printable(value)}"
 
 
-def _printable(value: Any) -> str:
+def printable(value: Any) -> str:
     """`value` as text that keeps to its line and moves no terminal, whatever a profile holds."""
     text = str(value)
     return text if text.isprintable() else repr(text)
