@@ -72,6 +72,15 @@ def test_no_effects_is_a_flat_diffuser(run, tmp_path):
     assert transform(tmp_path)([[0.2, 0.4, 0.8]]) == pytest.approx(np.sqrt([[0.02, 0.08, 0.32]]))
 
 
+def test_profiles_may_do_without_their_source(run, tmp_path):
+    assert run("build", PRIMARIES, "-o", tmp_path, "--no-source").code == 0
+    for name in ("mid.icc", "mvis.icc", "colour-mid.icc"):
+        small, full = iccbrdf.read_profile(tmp_path / name), iccbrdf.read_profile(PRIMARIES.with_name(name))
+        assert "bsrc" in full
+        assert "bsrc" not in small
+        assert len(small.to_bytes()) < len(full.to_bytes())
+
+
 def test_light_and_view_become_the_defaults(run, tmp_path):
     scene = ["--light", "60,90", "--view", "0.1,0,0.9", "--env", "litI=2"]
     built = run("build", PRIMARIES, "-o", tmp_path, *scene, "--json").json

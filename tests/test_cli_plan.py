@@ -57,6 +57,50 @@ def test_a_plan_as_json(run, image):
     assert 0 < plan["share_of_bounding"] < 1
 
 
+def test_a_plan_from_profiles_is_that_from_what_they_are_made_of(run, image, tmp_path):
+    path = image("relief matte")
+    scene = ("--light", "50,180", "--json")
+    expected = run("plan", path, "--primaries", PRIMARIES, *scene).json
+    pair = ("-p", PRIMARIES.with_name("mid.icc"), "-p", PRIMARIES.with_name("mvis.icc"))
+    found = run("plan", path, *pair, *scene).json
+    assert found["profiles"] == [str(PRIMARIES.with_name(name)) for name in ("mid.icc", "mvis.icc")]
+    assert (found["primaries"], found["lacking"]) == (None, [])
+    for key in ("kind", "effects", "without", "bound", "exact", "check", "executed"):
+        assert found[key] == expected[key]
+    # What the profiles state about light and view holds, and what they leave out is told.
+    build = ("build", PRIMARIES, "-o", tmp_path, "--without", "relief,shadowing", "--light", "50,180")
+    assert run(*build).code == 0
+    pair = ("-p", tmp_path / "mid.icc", "-p", tmp_path / "mvis.icc")
+    fewer = run("plan", path, *pair, "--json").json
+    assert (fewer["effects"], fewer["without"]) == (expected["effects"], expected["without"])
+    assert fewer["lacking"] == ["relief"]
+    assert "the profiles lack what is called for: relief" in run("plan", path, *pair).out
+
+
+def test_a_plan_from_a_colour_mid(run, image):
+    path = image("relief in XYZ")
+    pair = ("-p", PRINTER / "colour-mid.icc", "-p", PRINTER / "mvis.icc")
+    plan = run("plan", path, *pair, "--light", "30,0", "--json").json
+    assert plan["kind"] == "XYZ"
+    assert by_effect(plan)["slope"]["called_for"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ((), "give the profiles that the image is for (-p MID -p MVIS), or --primaries"),
+        (("--primaries", PRIMARIES, "-p", PRIMARIES.with_name("mvis.icc")), "or --primaries"),
+        (("-p", PRINTER / "table-mid.icc", "-p", PRINTER / "mvis.icc"), "(--primaries)"),
+        (("-p", PRINTER / "mid.icc", "-p", PRINTER / "mvis.icc", "--slopes", PRIMARIES), "--slopes"),
+        (("-p", PRINTER / "mid.icc"), "found no MVIS"),
+    ],
+)
+def test_what_a_plan_is_made_of_is_said_once(run, image, options, message):
+    result = run("plan", image("flat matte"), *options)
+    assert (result.code, result.out) == (2, "")
+    assert message in result.err
+
+
 def test_what_has_no_bound_is_null(run, image):
     arguments = ("--primaries", PRIMARIES, "--light", "89.9,0", "--json")
     below = by_effect(run("plan", image("relief glossy"), *arguments).json)["below-horizon"]
