@@ -214,7 +214,7 @@ def test_what_the_file_cannot_hold_is_refused(make, message):
         ("dict with translations", 48, "74657874", "found type 'text', expected 'mluc'"),
         ("ehim", 12, "00000002", "format: found 2"),
         ("gbd", 12, "0fffffff", "pcs: found"),
-        ("gbd", 16, "0fffffff", "268435455 triangles: found"),
+        ("gbd", 16, "0fffffff", r"triangles of shape \(268435455, 3\): found"),
         ("mft2", 10, "01", "grid: found 1, expected 2 to 255"),
         ("mft2", 48, "0001", "input_entries: found 1, expected 2 to 4096"),
         ("mft2", 8, "10", "input_tables: found 24 bytes, expected 64"),

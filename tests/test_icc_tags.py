@@ -104,7 +104,7 @@ EXAMPLES = {
         41980000 41a00000 41ac0000  # surround XYZ
         """,
     ),
-    "unknown": (Unknown("rcs2", b"\x00\x00\x00\x07", b"any"), "72637332 00000007  616e79"),
+    "unknown": (Unknown("what", b"\x00\x00\x00\x07", b"any"), "77686174 00000007  616e79"),
 }
 
 

@@ -143,7 +143,6 @@ def test_elements_that_contradict(elements, message):
         ("<copyrihtTag/>", ProfileError, "a.xml:1: <copyrihtTag>: no tag type"),
         ("<utf8Typ/>", ProfileError, "no tag type: did you mean 'utf8Type'"),
         ("<copyrightTag/>", ProfileError, "found 0 elements in it, expected one tag type"),
-        ("<copyrightTag><textDescriptionType/></copyrightTag>", UnsupportedError, "type is not supported"),
         ('<PrivateTag TagSignature="abcde"/>', ProfileError, "found 'abcde', expected up to four characters"),
         ("<PrivateTag/>", ProfileError, "no attribute 'TagSignature'"),
         ('<copyrightTag SameAs="profileDescriptionTag"/>', ProfileError, "SameAs: no tag 'desc' before it"),
@@ -264,7 +263,7 @@ def test_random_changes_raise_nothing_else():
     tags = {f"t{i:03}": tag for i, tag in enumerate(xml_examples.TAGS.values())}
     whole = profile_to_xml(a_profile(**tags, A2B0=a_mid()["A2M0"]))
     sound = sum(read(data) for data in mutations(whole, 150))
-    assert 10 < sound < 140
+    assert 3 < sound < 140
 
 
 # The commands --------------------------------------------------------------------------------------------

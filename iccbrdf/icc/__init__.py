@@ -1,6 +1,16 @@
 """The ICC.2 file format: bytes to objects and back.  Knows no BRDF and runs nothing."""
 
 from iccbrdf.icc.appearance import JabToXYZ, XYZToJab
+from iccbrdf.icc.classic import (
+    Chromaticity,
+    ColorantOrder,
+    DataTag,
+    Measurement,
+    NamedColour,
+    NamedColours,
+    PlainViewingConditions,
+    TextDescription,
+)
 from iccbrdf.icc.composite import Dictionary, Entry, Member, TagStruct
 from iccbrdf.icc.curves import (
     CURVES,
@@ -28,7 +38,19 @@ from iccbrdf.icc.gamut import GamutBoundary
 from iccbrdf.icc.header import D50, MCS_SUBSET, Header, channel_count
 from iccbrdf.icc.lut import Curve, LutAToB, LutBToA, ParametricCurve
 from iccbrdf.icc.lut_tables import Lut8, Lut16
-from iccbrdf.icc.packed import CompressedUtf8, CompressedXml, HeightImage, NormalImage
+from iccbrdf.icc.packed import CompressedUtf8, CompressedXml, HeightImage, NormalImage, VendorXml
+from iccbrdf.icc.printer import (
+    BlackGeneration,
+    Combination,
+    CrdInfo,
+    DeviceSettings,
+    PlatformSettings,
+    ResponseCurve,
+    ResponseCurves,
+    Screen,
+    Screening,
+    Setting,
+)
 from iccbrdf.icc.profile import (
     MissingTagError,
     Profile,
@@ -36,6 +58,14 @@ from iccbrdf.icc.profile import (
     read_profile,
     write_profile,
 )
+from iccbrdf.icc.sequence import (
+    EmbeddedProfile,
+    ProfileDescription,
+    ProfileIdentities,
+    ProfileIdentity,
+    ProfileSequence,
+)
+from iccbrdf.icc.sparse import SparseMatrix, SparseMatrixArray
 from iccbrdf.icc.spectral import (
     EmissionClut,
     EmissionMatrix,
@@ -75,16 +105,24 @@ __all__ = [
     "TAGS",
     "XYZ",
     "BeginAlternateSpace",
+    "BlackGeneration",
     "Calculator",
+    "Chromaticity",
     "Clut",
     "Colorant",
+    "ColorantOrder",
     "ColorantTable",
+    "Combination",
     "CompressedUtf8",
     "CompressedXml",
+    "CrdInfo",
     "Curve",
     "CurveSet",
+    "DataTag",
     "DateTime",
+    "DeviceSettings",
     "Dictionary",
+    "EmbeddedProfile",
     "EmissionClut",
     "EmissionMatrix",
     "EmissionObserver",
@@ -103,25 +141,42 @@ __all__ = [
     "LutAToB",
     "LutBToA",
     "Matrix",
+    "Measurement",
     "Member",
     "MissingTagError",
     "Mluc",
     "MultiProcess",
+    "NamedColour",
+    "NamedColours",
     "NormalImage",
     "NumberArray",
     "ParametricCurve",
     "PlainText",
+    "PlainViewingConditions",
+    "PlatformSettings",
     "Profile",
+    "ProfileDescription",
+    "ProfileIdentities",
+    "ProfileIdentity",
+    "ProfileSequence",
     "ReflectanceClut",
     "ReflectanceObserver",
+    "ResponseCurve",
+    "ResponseCurves",
     "SampledCalculatorCurve",
     "SampledCurve",
     "SampledSegment",
+    "Screen",
+    "Screening",
     "SegmentedCurve",
+    "Setting",
     "SignatureTag",
+    "SparseMatrix",
+    "SparseMatrixArray",
     "SpectralDataInfo",
     "TagArray",
     "TagStruct",
+    "TextDescription",
     "TintArray",
     "ToneFunction",
     "ToneMap",
@@ -129,6 +184,7 @@ __all__ = [
     "UnknownElement",
     "Utf8",
     "Utf16",
+    "VendorXml",
     "VideoCodePoints",
     "ViewingConditions",
     "XYZToJab",

@@ -76,11 +76,12 @@ class Reserved(FieldType):
 class Bytes(FieldType):
     """Raw bytes: `size` of them, or all to the end of the structure."""
 
-    def __init__(self, size: int | None = None) -> None:
+    def __init__(self, size: Count | None = None) -> None:
         self.size = size
 
     def read(self, reader: Reader, name: str, seen: Seen) -> bytes:
-        return bytes(reader.take(reader.left if self.size is None else self.size, name))
+        size = self.size(seen) if callable(self.size) else self.size
+        return bytes(reader.take(reader.left if size is None else size, name))
 
     def write(self, out: bytearray, value: bytes, record: Any) -> None:
         out += value
@@ -88,7 +89,7 @@ class Bytes(FieldType):
     def normal(self, value: Any) -> bytes:
         if not isinstance(value, (bytes, bytearray, memoryview)):
             raise ValueError(f"found {value!r}, expected bytes")
-        if self.size is not None and len(value) != self.size:
+        if isinstance(self.size, int) and len(value) != self.size:
             raise ValueError(f"found {len(value)} bytes, expected {self.size}")
         return bytes(value)
 
@@ -102,7 +103,10 @@ class Text(FieldType):
 
     def read(self, reader: Reader, name: str, seen: Seen) -> str:
         at = reader.position
-        data = bytes(reader.take(reader.left, name))
+        return self.decode(reader, bytes(reader.take(reader.left, name)), name, at)
+
+    def decode(self, reader: Reader, data: bytes, name: str, at: int) -> str:
+        """The text that `data`, read at window offset `at`, stands for."""
         try:
             return data.decode(self.encoding).rstrip("\0")
         except UnicodeDecodeError as error:
@@ -164,19 +168,24 @@ class Float(FieldType):
             ) from None
 
 
-class S15Fixed16(FieldType):
-    """A signed fixed-point number: -32768 to 32767 + 65535/65536 in steps of 1/65536, rounded half away."""
+class Fixed16(FieldType):
+    """A fixed-point number of 32 bits in steps of 1/65536, rounded half away from zero."""
+
+    def __init__(self, *, signed: bool) -> None:
+        self.signed = signed
+        self.first = -(2**31) if signed else 0
 
     def read(self, reader: Reader, name: str, seen: Seen) -> float:
-        return int.from_bytes(reader.take(4, name), "big", signed=True) / 65536
+        return int.from_bytes(reader.take(4, name), "big", signed=self.signed) / 65536
 
     def write(self, out: bytearray, value: float, record: Any) -> None:
-        out += round(value * 65536).to_bytes(4, "big", signed=True)
+        out += round(value * 65536).to_bytes(4, "big", signed=self.signed)
 
     def normal(self, value: Any) -> float:
         steps = float(value) * 65536
-        if not -(2.0**31) - 0.5 < steps < 2.0**31 - 0.5:
-            raise ValueError(f"found {value}, expected -32768 to 32767.99998")
+        if not self.first - 0.5 < steps < self.first + 2.0**32 - 0.5:
+            lowest = self.first // 65536
+            raise ValueError(f"found {value}, expected {lowest} to {lowest + 65535}.99998")
         return math.copysign(math.floor(abs(steps) + 0.5), steps) / 65536
 
 
@@ -207,7 +216,7 @@ class Signature(FieldType):
 
 U8, U16, U32, U64 = (Integer(code) for code in "BHIQ")
 F16, F32 = Float("e"), Float("f")
-S15 = S15Fixed16()
+S15, U16_16 = Fixed16(signed=True), Fixed16(signed=False)
 SIGNATURE = Signature()
 
 
@@ -324,7 +333,9 @@ class Sequential(FieldType):
         self.count = count
 
     def read(self, reader: Reader, name: str, seen: Seen) -> tuple[Any, ...]:
-        return tuple(self.registry.read(reader) for _ in range(self.count(seen)))
+        count = self.count(seen)
+        reader.count_parts(count)
+        return tuple(self.registry.read(reader) for _ in range(count))
 
     def write(self, out: bytearray, value: Sequence[Any], record: Any) -> None:
         for item in value:

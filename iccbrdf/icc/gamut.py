@@ -3,29 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from iccbrdf.icc.fields import U16, U32, FloatArray, Floats, frozen, tag_layout
-from iccbrdf.icc.layout import Field, FieldType, Record, Seen
-from iccbrdf.icc.reader import Reader
+from iccbrdf.icc.fields import U16, U32, FloatArray, Floats, tag_layout
+from iccbrdf.icc.layout import Field, Record
+from iccbrdf.icc.rows import Integers
 from iccbrdf.icc.tags import TAGS
-
-
-class _Triangles(FieldType):
-    """Three vertex numbers each."""
-
-    def read(self, reader: Reader, name: str, seen: Seen) -> npt.NDArray[np.uint32]:
-        data = reader.take(12 * seen["count"], f"{seen['count']} triangles")
-        return np.frombuffer(data, ">u4").reshape(-1, 3).astype(np.uint32)
-
-    def write(self, out: bytearray, value: npt.NDArray[np.uint32], record: Any) -> None:
-        out += value.astype(">u4").tobytes()
-
-    def normal(self, value: Any) -> npt.NDArray[np.uint32]:
-        return frozen(value, np.uint32)
 
 
 @TAGS.add("gbd ")
@@ -49,7 +34,7 @@ class GamutBoundary(Record):
         Field("device_channels", U16, derived=lambda r: r.device.shape[1]),
         Field("vertices", U32, derived=lambda r: len(r.pcs)),
         Field("count", U32, derived=lambda r: len(r.triangles)),
-        Field("triangles", _Triangles()),
+        Field("triangles", Integers(">u4", lambda seen: (seen["count"], 3))),
         Field("pcs", Floats(lambda seen: (seen["vertices"], seen["pcs_channels"]))),
         Field("device", Floats(lambda seen: (seen["vertices"], seen["device_channels"]))),
     )

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import hashlib
 from abc import ABC, abstractmethod
+from collections import ChainMap
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, TypeAlias, TypeVar
 
 from iccbrdf.errors import UsageError
@@ -61,12 +63,13 @@ class Layout:
         self.fields = tuple(f if isinstance(f, Field) else Field("", f) for f in fields)
         self.exact = exact
 
-    def read(self, reader: Reader) -> dict[str, Any]:
-        """All named fields from the reader's position on."""
+    def read(self, reader: Reader, around: Seen) -> dict[str, Any]:
+        """All named fields from the reader's position on; `around`: those of the structure that holds it."""
         seen: dict[str, Any] = {}
+        visible = ChainMap(seen, dict(around)) if around else seen
         for field in self.fields:
             at = reader.position
-            value = field.type.read(reader, field.name, seen)
+            value = field.type.read(reader, field.name, visible)
             if field.valid is not None and value not in field.valid:
                 raise reader.error(f"{field.name}: found {value}, expected {_listed(field.valid)}", at=at)
             if field.name:
@@ -138,10 +141,13 @@ class Record:
         """Raise ValueError, saying what was found and what was expected, where the fields contradict."""
 
     @classmethod
-    def read(cls: type[R], reader: Reader) -> R:
-        """Read one from the reader's position on; ProfileError where it is malformed."""
+    def read(cls: type[R], reader: Reader, around: Seen = MappingProxyType({})) -> R:
+        """Read one from the reader's position on; ProfileError where it is malformed.
+
+        Its fields may depend on `around`, those of the structure that holds it.
+        """
         at = reader.position
-        seen = cls.layout.read(reader)
+        seen = cls.layout.read(reader, around)
         try:
             record = cls.build(seen)
         except UsageError as error:

@@ -132,14 +132,21 @@ class Reader:
         for index, span in enumerate(spans):
             if span in known:
                 value, weight = known[span]
-                self._spend(weight)
+                self.count_parts(weight)
             else:
                 before = self._budget.spent
-                self._spend(1)
+                self.count_parts(1)
                 value = read(self.part(*span, label(index)), index)
                 known[span] = value, self._budget.spent - before
             values.append(value)
         return values
+
+    def count_parts(self, parts: int) -> None:
+        """Account for parts that become objects; LimitError where they are too many."""
+        # Shared parts inside shared parts multiply: few bytes could stand for endless objects.
+        self._budget.spent += parts
+        if self._budget.spent > MAX_PARTS:
+            raise LimitError(f"{self.where}: more parts in one tag than the limit of {MAX_PARTS}")
 
     def count_operations(self, count: int) -> None:
         """Account for the operations of a program that is to be read; LimitError where they are too many."""
@@ -165,9 +172,3 @@ class Reader:
                     at=offset,
                 )
             end = offset + size
-
-    def _spend(self, parts: int) -> None:
-        # Shared parts inside shared parts multiply: few bytes could stand for endless objects.
-        self._budget.spent += parts
-        if self._budget.spent > MAX_PARTS:
-            raise LimitError(f"{self.where}: more parts in one tag than the limit of {MAX_PARTS}")

@@ -33,6 +33,7 @@ from iccbrdf.icc.fields import (
 )
 from iccbrdf.icc.layout import Field, FieldType, Layout, Record, Registry, Seen
 from iccbrdf.icc.reader import Reader
+from iccbrdf.icc.rows import PaddedText, Structures
 
 TAGS = Registry("tag type")
 
@@ -314,37 +315,14 @@ class TagArray(Record):
         return tuple(item.text for item in self.items)
 
 
-class _Colorants(FieldType):
-    """Names of 32 bytes, filled up with NUL, each with three 16-bit PCS numbers."""
-
-    _entry = struct.Struct(">32s3H")
-
-    def read(self, reader: Reader, name: str, seen: Seen) -> tuple[Colorant, ...]:
-        table = reader.take(self._entry.size * seen["count"], "colorants")
-        return tuple(
-            Colorant(text.split(b"\0")[0].decode("latin-1"), (a, b, c))
-            for text, a, b, c in self._entry.iter_unpack(table)
-        )
-
-    def write(self, out: bytearray, value: Sequence[Colorant], record: Any) -> None:
-        for colorant in value:
-            out += self._entry.pack(colorant.name.encode("latin-1"), *colorant.pcs)
-
-    def normal(self, value: Iterable[Colorant]) -> tuple[Colorant, ...]:
-        for colorant in value:
-            if not 0 < len(colorant.name.encode("latin-1")) < 32 or "\0" in colorant.name:
-                raise ValueError(f"found name {colorant.name!r}, expected 1 to 31 characters of Latin-1")
-            if not all(0 <= number < 65536 for number in colorant.pcs):
-                raise ValueError(f"found {colorant.pcs}, expected three 16-bit numbers")
-        return tuple(value)
-
-
-@dataclass(frozen=True)
-class Colorant:
+@dataclass(frozen=True, eq=False)
+class Colorant(Record):
     """A device channel's name and its colour in the connection space, as stored in 16 bits (0: not said)."""
 
     name: str
     pcs: tuple[int, int, int] = (0, 0, 0)
+
+    layout = Layout(Field("name", PaddedText(32, shortest=1)), Field("pcs", Repeat(U16, 3)))
 
 
 @TAGS.add("clrt")
@@ -358,7 +336,7 @@ class ColorantTable(Record):
     layout = tag_layout(
         signature,
         Field("count", U32, derived=lambda r: len(r.colorants)),
-        Field("colorants", _Colorants()),
+        Field("colorants", Structures(Colorant, lambda seen: int(seen["count"]))),
     )
 
     @classmethod

@@ -21,25 +21,31 @@ _FOUR_BYTES = Codec(signature_bytes, signature_text)
 _NULL = "NullTag"
 """An array position that holds nothing, for which the ICC's dialect has no element."""
 
-ABSENT = (
-    "chromaticityType",
-    "colorantOrderType",
-    "crdInfoType",
-    "dataType",
-    "deviceSettingsType",
-    "embeddedProfileType",
-    "measurementType",
-    "namedColor2Type",
-    "profileSequenceDescType",
-    "profileSequenceIdentifierType",
-    "responseCurveSet16Type",
-    "screeningType",
-    "sparseMatrixArrayType",
-    "textDescriptionType",
-    "ucrBgType",
-    "viewingConditionsType",
-)
-"""Tag types of the dialect that have no record here; in a profile they stay bytes."""
+
+def _read_bytes(node: Node, signature: bytes) -> Any:
+    """The tag whose bytes after its type signature stand in an element."""
+    data = node.child("UnknownData")
+    content = node.value(HEX_LINES, data.text if data is not None else "")
+    return TAGS.read(Reader(signature + content, node.source, f"line {node.line}"))
+
+
+def _write_bytes(out: Target, record: Any) -> None:
+    out.child("UnknownData").write(HEX_LINES.write(record.to_bytes()[4:]))
+
+
+class BytesForm(Form):
+    """A tag type that has a name in the dialect, but whose content stands there as bytes.
+
+    The ICC's tools do not write the attribute `type`, without which they lose the type when they read.
+    """
+
+    def read(self, node: Node) -> Any:
+        node.expect(("type", "reserved"), ("UnknownData",))
+        return _read_bytes(node, signature_bytes(self.signature))
+
+    def write(self, out: Target, record: Any) -> None:
+        out.set("type", SIGNATURE.write(self.signature))
+        _write_bytes(out, record)
 
 
 class _TypeForms(Forms):
@@ -49,10 +55,7 @@ class _TypeForms(Forms):
         if node.name != _PRIVATE:
             return super().read(node)
         node.expect(("type", "reserved"), ("UnknownData",))
-        data = node.child("UnknownData")
-        signature = node.value(_FOUR_BYTES, node.get("type"), "type")
-        content = node.value(HEX_LINES, data.text if data is not None else "")
-        return TAGS.read(Reader(signature + content, node.source, f"line {node.line}"))
+        return _read_bytes(node, node.value(_FOUR_BYTES, node.get("type"), "type"))
 
     def write(self, out: Target, record: Any) -> None:
         if not isinstance(record, Unknown):
@@ -60,10 +63,10 @@ class _TypeForms(Forms):
             return
         private = out.child(_PRIVATE)
         private.set("type", SIGNATURE.write(record.signature))
-        private.child("UnknownData").write(HEX_LINES.write(record.reserved + record.data))
+        _write_bytes(private, record)
 
 
-TYPE_FORMS = _TypeForms("tag type", absent=ABSENT)
+TYPE_FORMS = _TypeForms("tag type")
 
 
 class NamedTags:
@@ -111,7 +114,7 @@ class NamedTags:
     def _legacy(node: Node) -> tuple[list[str], Any]:
         """The older form: the tag type outside, the signatures inside."""
         signatures = [_signature(c, c.text) for c in node if c.name == _SIGNATURES]
-        if not signatures and node.name not in (*TYPE_FORMS.by_name, *TYPE_FORMS.absent, _PRIVATE):
+        if not signatures and node.name not in (*TYPE_FORMS.by_name, _PRIVATE):
             TYPE_FORMS.read(node)  # which says that there is no such name
         if not signatures:
             raise node.error(f"no <{_SIGNATURES}> found in it, expected one or more")
@@ -149,9 +152,9 @@ class _Members(Part):
             wrapper.expect((), ("MemberTags",))
             seen["type"] = STRUCTURES[wrapper.name]
         else:
-            signature = _expected(node, "StructureSignature")
+            signature = node.required("StructureSignature")
             seen["type"] = _signature(signature, signature.text)
-        members = _expected(wrapper or node, "MemberTags")
+        members = (wrapper or node).required("MemberTags")
         tags = NamedTags(MEMBERS.get(seen["type"], {}), "PrivateSubTag").read(members)
         seen["members"] = tuple(Member(signature, tag) for signature, tag in tags.items())
 
@@ -173,9 +176,9 @@ class _Items(Part):
             wrapper.expect((), ("ArrayTags",))
             seen["array_type"] = ARRAYS[wrapper.name]
         else:
-            signature = _expected(node, "ArraySignature")
+            signature = node.required("ArraySignature")
             seen["array_type"] = _signature(signature, signature.text)
-        items = _expected(wrapper or node, "ArrayTags")
+        items = (wrapper or node).required("ArrayTags")
         seen["items"] = tuple(None if i.name == _NULL else TYPE_FORMS.read(i) for i in items)
 
     def write(self, out: Target, record: TagArray) -> None:
@@ -186,13 +189,6 @@ class _Items(Part):
                 items.child(_NULL)
             else:
                 TYPE_FORMS.write(items, item)
-
-
-def _expected(node: Node, name: str) -> Node:
-    child = node.child(name)
-    if child is None:
-        raise node.error(f"no <{name}> found in it, expected one")
-    return child
 
 
 TYPE_FORMS.add(

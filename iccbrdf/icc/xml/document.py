@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 from lxml import etree
 
-from iccbrdf.errors import ProfileError, UsageError
+from iccbrdf.errors import UsageError
 from iccbrdf.icc.profile import Profile
 from iccbrdf.icc.source_tag import readable_source
-from iccbrdf.icc.xml import calculator, luts, tags  # noqa: F401  (they add their forms to the tables)
-from iccbrdf.icc.xml.composite import NamedTags
-from iccbrdf.icc.xml.header import HEADER
-from iccbrdf.icc.xml.node import Document, Job, Node, Target, parse
-from iccbrdf.icc.xml.tag_names import TAG_NAMES
-
-_TAGS = NamedTags(TAG_NAMES, "PrivateTag")
+from iccbrdf.icc.xml import calculator, classic, luts, sequence, sparse, tags  # noqa: F401  (they add their forms to the tables)
+from iccbrdf.icc.xml.node import Document, Job, Target, parse
+from iccbrdf.icc.xml.whole import ROOT, read_whole, write_whole
 
 
 def profile_to_xml(profile: Profile) -> bytes:
@@ -36,16 +31,10 @@ def profile_to_xml(profile: Profile) -> bytes:
     LimitError
         The document would be too large for XML readers.
     """
-    records = {signature: profile[signature] for signature in profile}
-    root = etree.Element("IccProfile")
+    root = etree.Element(ROOT)
     source = readable_source(profile, profile.source)
     names = {id(element): one for element, one in source.found_in(profile)}
-    out = Target(root, Job(profile.source, names))
-    try:
-        HEADER.write(out.child("Header"), profile.header)
-    except ValueError as error:
-        raise ProfileError(f"{profile.source}: header: {error}") from None
-    _TAGS.write(out.child("Tags"), records)
+    write_whole(Target(root, Job(profile.source, names)), profile)
     etree.indent(root)
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8")) + b"\n"
 
@@ -79,13 +68,11 @@ def profile_from_xml(
         It is no well-formed XML, or a file that it names cannot be read.
     ProfileError
         It describes no profile: file, line and element, what was found and what was expected.
-    UnsupportedError
-        It has a tag type that this library does not read.
     LimitError
         It, with the files that it names, is larger or deeper than the limits.
     """
     document = Document(None if folder is None else Path(folder), strict=strict)
-    return _profile(parse(data, source, document), source)
+    return read_whole(parse(data, source, document))
 
 
 def read_xml(
@@ -100,23 +87,4 @@ def read_xml(
         document = Document(file.parent if folder is None else Path(folder), strict=strict)
     except TypeError as error:
         raise UsageError(f"not the path of an XML file: {error}") from None
-    return _profile(parse(document.read(file), str(path), document), str(path))
-
-
-def _profile(root: Node, source: str) -> Profile:
-    if root.name != "IccProfile":
-        raise root.error("expected <IccProfile> as the outermost element")
-    root.expect((), ("Header", "Tags"))
-    header, body = (_child(root, name) for name in ("Header", "Tags"))
-    found: dict[str, Any] = _TAGS.read(body)
-    try:
-        return Profile(HEADER.read(header), found, source=source)
-    except UsageError as error:
-        raise body.error(str(error)) from None
-
-
-def _child(root: Node, name: str) -> Node:
-    child = root.child(name)
-    if child is None:
-        raise root.error(f"no <{name}> found in it, expected one")
-    return child
+    return read_whole(parse(document.read(file), str(path), document))

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from iccbrdf.errors import LimitError, UnsupportedError, UsageError, nearest
+from iccbrdf.errors import LimitError, UsageError, nearest
 from iccbrdf.icc.fields import ENCODINGS
 from iccbrdf.icc.layout import shown
 from iccbrdf.icc.reader import MAX_DEPTH
@@ -240,7 +240,10 @@ class Rows(Part):
             if child.name == self.name:
                 row: Seen = {}
                 read_parts(self.parts, child, row)
-                rows.append(self.make(**row))
+                try:
+                    rows.append(self.make(**row))
+                except UsageError as error:
+                    raise child.error(str(error)) from None
         seen[self.field] = tuple(rows)
 
     def write(self, out: Target, record: Any) -> None:
@@ -295,14 +298,10 @@ class Form:
 
 
 class Forms:
-    """The forms of one kind of record (tag types, elements, curves), by name and by signature.
+    """The forms of one kind of record (tag types, elements, curves), by name and by signature."""
 
-    `absent`: names that the dialect has and this library has no record for.
-    """
-
-    def __init__(self, kind: str, absent: tuple[str, ...] = ()) -> None:
+    def __init__(self, kind: str) -> None:
         self.kind = kind
-        self.absent = absent
         self.by_name: dict[str, Form] = {}
         self.by_signature: dict[str, Form] = {}
 
@@ -318,8 +317,6 @@ class Forms:
         node.records += 1
         if node.name in self.by_name:
             return self.by_name[node.name].read(node)
-        if node.name in self.absent:
-            raise node.error(f"this {self.kind} is not supported", kind=UnsupportedError)
         raise node.error(f"no {self.kind}: {nearest(node.name, self.by_name)}")
 
     def write(self, out: Target, record: Any) -> None:

@@ -90,7 +90,7 @@ class _Bits(Part):
         rest = node.value(_HEX_NUMBER, node.attributes.get(self.rest, "0"), self.rest)
         seen[self.field] = value | rest
 
-    def write(self, out: Target, record: Header) -> None:
+    def write(self, out: Target, record: Any) -> None:
         value = getattr(record, self.field)
         for name, (bit, *states) in self.names.items():
             out.set(name, states[value >> bit & 1])
@@ -103,6 +103,23 @@ def _present(name: str, field: str, codec: Codec, default: Any = "") -> Inside:
     """A value that is written always and may be missing."""
     return Inside(name, Content(field, codec), default=lambda seen: {field: default})
 
+
+ATTRIBUTES = Inside(
+    "DeviceAttributes",
+    _Bits(
+        "attributes",
+        "VendorSpecific",
+        16,
+        {
+            "ReflectiveOrTransparency": (0, "reflective", "transparency"),
+            "GlossyOrMatte": (1, "glossy", "matte"),
+            "MediaPolarity": (2, "positive", "negative"),
+            "MediaColour": (3, "colour", "blackAndWhite"),
+        },
+    ),
+    default=lambda seen: {"attributes": 0},
+)
+"""What a device does with light, in a header or a profile sequence."""
 
 HEADER = Form(
     "Header",
@@ -133,21 +150,7 @@ HEADER = Form(
     ),
     optional("DeviceManufacturer", Content("manufacturer", SIGNATURE), ""),
     optional("DeviceModel", Content("model", SIGNATURE), ""),
-    Inside(
-        "DeviceAttributes",
-        _Bits(
-            "attributes",
-            "VendorSpecific",
-            16,
-            {
-                "ReflectiveOrTransparency": (0, "reflective", "transparency"),
-                "GlossyOrMatte": (1, "glossy", "matte"),
-                "MediaPolarity": (2, "positive", "negative"),
-                "MediaColour": (3, "colour", "blackAndWhite"),
-            },
-        ),
-        default=lambda seen: {"attributes": 0},
-    ),
+    ATTRIBUTES,
     _present("RenderingIntent", "rendering_intent", _INTENT, 0),
     Inside(
         "PCSIlluminant",

@@ -194,6 +194,13 @@ class Node:
             found[1].warn(f"a second one in <{self.name}> is ignored")
         return found[0] if found else None
 
+    def required(self, name: str) -> Node:
+        """The one element in it of this name, which must be there."""
+        child = self.child(name)
+        if child is None:
+            raise self.error(f"no <{name}> found in it, expected one")
+        return child
+
     def expect(self, attributes: tuple[str, ...], children: tuple[str, ...] | None) -> None:
         """Warn of attributes and, unless None, elements of other names than these, as they are ignored."""
         for name in self.attributes:
@@ -264,5 +271,3 @@ class Target:
             self.element.text = text
         except ValueError:
             raise self.error(f"found {text!r:.80}, a character that XML cannot hold") from None
-
-

@@ -12,7 +12,7 @@ from iccbrdf.icc.composite import Dictionary, Entry
 from iccbrdf.icc.curves import SegmentedCurve
 from iccbrdf.icc.elements import MultiProcess
 from iccbrdf.icc.gamut import GamutBoundary
-from iccbrdf.icc.packed import CompressedUtf8, CompressedXml, HeightImage, NormalImage
+from iccbrdf.icc.packed import CompressedUtf8, CompressedXml, HeightImage, NormalImage, VendorXml
 from iccbrdf.icc.spectral import SpectralDataInfo
 from iccbrdf.icc.tags import (
     XYZ,
@@ -29,7 +29,7 @@ from iccbrdf.icc.tags import (
     ViewingConditions,
 )
 from iccbrdf.icc.xml.arrays import NUMBER_FORMS, Triple, Wavelengths, spectral_range
-from iccbrdf.icc.xml.composite import TYPE_FORMS
+from iccbrdf.icc.xml.composite import TYPE_FORMS, BytesForm
 from iccbrdf.icc.xml.elements import CHANNELS, CURVE_FORMS, ELEMENT_FORMS
 from iccbrdf.icc.xml.forms import (
     Attribute,
@@ -64,7 +64,7 @@ from iccbrdf.icc.xml.values import (
 # Texts -------------------------------------------------------------------------------------------------
 
 
-class _Text(Part):
+class TextData(Part):
     """Text in one element or several, as such, in hexadecimal digits, or in a file."""
 
     children: tuple[str, ...] = ("TextData", "HexTextData")
@@ -87,13 +87,19 @@ class _Text(Part):
             raise node.error(f"found bytes that are no UTF-8 ({error.reason})") from None
 
     def write(self, out: Target, record: Any) -> None:
-        out.child("TextData").write(record.text)
+        if _CONTROL.search(record.text):  # which XML cannot hold
+            out.child("HexTextData").write(HEX_LINES.write(record.text.encode("utf-8")))
+        else:
+            out.child("TextData").write(record.text)
 
 
-class _Compressed(_Text):
+_CONTROL = re.compile("[\0-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
+
+
+class _Compressed(TextData):
     """A compressed text as its bytes, or as text that is to be compressed."""
 
-    children = ("HexCompressedData", *_Text.children)
+    children = ("HexCompressedData", *TextData.children)
 
     def read(self, node: Node, seen: Seen) -> None:
         packed = node.child("HexCompressedData")
@@ -108,13 +114,14 @@ class _Compressed(_Text):
         out.child("HexCompressedData").write(HEX_LINES.write(record.data))
 
 
-class _Language(Part):
-    """Language and country in one attribute."""
+class Language(Part):
+    """Language and country in one attribute; written under the first of the `names`, read under any."""
 
-    attributes = ("LanguageCountry",)
+    def __init__(self, *names: str) -> None:
+        self.attributes = names
 
     def read(self, node: Node, seen: Seen) -> None:
-        name = self.attributes[0]
+        name = next((name for name in self.attributes if name in node.attributes), self.attributes[0])
         code = node.value(_CODE, node.get(name), name)
         seen["language"], seen["country"] = code[:2], code[2:]
 
@@ -129,7 +136,7 @@ _CODE = Codec(
 
 
 TEXT = Codec(str, str)
-_LOCALISED = (_Language(), Content("text", TEXT))
+LOCALISED = (Language("LanguageCountry"), Content("text", TEXT))
 
 
 class _Translations(Part):
@@ -138,7 +145,7 @@ class _Translations(Part):
     def __init__(self, name: str, field: str) -> None:
         self.children = (name,)
         self.field = field
-        self._rows = Rows(name, "texts", LocalisedText, *_LOCALISED)
+        self._rows = Rows(name, "texts", LocalisedText, *LOCALISED)
 
     def read(self, node: Node, seen: Seen) -> None:
         found: Seen = {}
@@ -161,19 +168,18 @@ def _date(text: str) -> tuple[int, ...]:
 DATE = Codec(_date, lambda d: f"{d[0]}-{d[1]:02}-{d[2]:02}T{d[3]:02}:{d[4]:02}:{d[5]:02}")
 
 TYPE_FORMS.add(
-    Form("utf8Type", Utf8, _Text(), aliases=("utf8TextType",)),
-    Form("utf16Type", Utf16, _Text()),
-    Form("textType", PlainText, _Text()),
+    Form("utf8Type", Utf8, TextData(), aliases=("utf8TextType",)),
+    Form("utf16Type", Utf16, TextData()),
+    Form("textType", PlainText, TextData()),
     Form(
         "utf8ZipType",
         CompressedUtf8,
         _Compressed(),
         aliases=("zipUtf8TextType",),
     ),
-    Form("zipXmlType", CompressedXml, _Compressed(), aliases=("ZIPXmlType",)),
-    Form(
-        "multiLocalizedUnicodeType", Mluc, Rows("LocalizedText", "texts", LocalisedText, *_LOCALISED)
-    ),
+    Form("zipXmlType", CompressedXml, _Compressed()),
+    BytesForm("ZIPXmlType", VendorXml),
+    Form("multiLocalizedUnicodeType", Mluc, Rows("LocalizedText", "texts", LocalisedText, *LOCALISED)),
     Form("signatureType", SignatureTag, Inside("Signature", Content("value", SIGNATURE))),
     Form("dateTimeType", DateTime, Inside("DateTime", Content("value", DATE))),
     Form(
@@ -239,7 +245,7 @@ def _names(*names: str) -> tuple[str, ...]:
     return (*(f"Illuminant {name}" for name in names), *names)
 
 
-_OBSERVER = choice(
+OBSERVER = choice(
     {
         0: ("Unknown observer", "Unknown Observer", "Custom"),
         1: ("CIE 1931 (two degree) standard observer", "CIE 1931 standard colorimetric observer"),
@@ -251,7 +257,7 @@ _ILLUMINANTS = (
     "B", "C", "F1", "F3", "F4", "F5", "F6", "F7", "F9", "F10", "F11", "F12",
 )  # fmt: skip
 _MORE_NAMES = {0: ("Custom",), 7: _names("E")}
-_ILLUMINANT = choice(
+ILLUMINANT = choice(
     {number: (*_names(name), *_MORE_NAMES.get(number, ())) for number, name in enumerate(_ILLUMINANTS)}
 )
 
@@ -310,10 +316,10 @@ TYPE_FORMS.add(
     Form(
         "spectralViewingConditionsType",
         ViewingConditions,
-        Inside("StdObserver", Content("observer", _OBSERVER)),
+        Inside("StdObserver", Content("observer", OBSERVER)),
         Inside("IlluminantXYZ", Triple("illuminant_XYZ", FLOAT32)),
         _spectral("ObserverFuncs", "observer", "observer_table", 3),
-        Inside("StdIlluminant", Content("illuminant", _ILLUMINANT)),
+        Inside("StdIlluminant", Content("illuminant", ILLUMINANT)),
         Inside("ColorTemperature", Content("cct", _TEMPERATURE), default=lambda seen: {"cct": 0.0}),
         _spectral("IlluminantSPD", "illuminant", "spd", 1),
         Inside("SurroundXYZ", Triple("surround_XYZ", FLOAT32)),

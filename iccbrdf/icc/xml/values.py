@@ -181,14 +181,21 @@ RESERVED = Codec(
 """Four bytes as an integer."""
 
 
+_OTHER = re.compile(r"(?:Unknown [A-Za-z ]+ '(?=-?\d))?((?<=')-\d{1,10}|\d{1,10})'?")
+
+
 def choice(names: Mapping[int, tuple[str, ...]]) -> Codec:
-    """A number that stands for one of several names, of which the first is written; others as digits."""
+    """A number that stands for one of several names, of which the first is written; others as digits.
+
+    The ICC's tools write others as `Unknown Illuminant '99`, which is read as well.
+    """
     values = {name: value for value, several in names.items() for name in several}
 
     def read(text: str) -> int:
         text = text.strip()
-        if text.isdecimal() and len(text) <= 10:
-            return int(text)
+        other = _OTHER.fullmatch(text)
+        if other is not None:
+            return int(other[1]) % (1 << 32)
         if text not in values:
             raise ValueError(f"found {text!r:.60}: {nearest(text, values)}")
         return values[text]
