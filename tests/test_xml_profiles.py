@@ -22,7 +22,6 @@ from iccbrdf.icc import (
     NumberArray,
     Profile,
     Unknown,
-    Utf8,
     read_profile,
 )
 from iccbrdf.icc.xml import profile_from_xml, profile_to_xml, read_xml

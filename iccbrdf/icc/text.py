@@ -13,9 +13,13 @@ import numpy.typing as npt
 from iccbrdf.calc.program import Op, Program
 from iccbrdf.errors import IccBrdfError
 from iccbrdf.icc.profile import Profile
+from iccbrdf.icc.sequence import EmbeddedProfile
 
 Listing: TypeAlias = Callable[[Program], str]
 """Gives the text of a calculator program."""
+
+MAX_PROFILES = 16
+"""Profiles inside tags that are shown, those inside of them counted too."""
 
 
 def to_dict(profile: Profile, *, listing: Listing | None = None, longest: int = 64) -> dict[str, Any]:
@@ -23,14 +27,9 @@ def to_dict(profile: Profile, *, listing: Listing | None = None, longest: int = 
 
     Arrays and bytes with more than `longest` entries are summarised by shape, extremes and their beginning.
     Programs appear as the lines of `listing`, else as their number of operations.  A tag that cannot
-    be decoded has an `error`.  What no JSON number can be is text: "NaN", "Infinity", "-Infinity".
+    be decoded has an `error`, as has a profile inside a tag, of which the first `MAX_PROFILES` are shown.  What no JSON number can be is text: "NaN", "Infinity", "-Infinity".
     """
-    plain = _Plain(listing, longest)
-    return {
-        "source": profile.source,
-        "header": plain.record(profile.header),
-        "tags": {signature: plain.tag(profile, signature) for signature in profile},
-    }
+    return _Plain(listing, longest).profile(profile)
 
 
 def describe(profile: Profile, *, listing: Listing | None = None, longest: int = 16) -> str:
@@ -44,6 +43,23 @@ class _Plain:
     def __init__(self, listing: Listing | None, longest: int) -> None:
         self.listing = listing
         self.longest = longest
+        self._profiles_left = MAX_PROFILES
+
+    def profile(self, profile: Profile) -> dict[str, Any]:
+        return {
+            "source": profile.source,
+            "header": self.record(profile.header),
+            "tags": {signature: self.tag(profile, signature) for signature in profile},
+        }
+
+    def embedded(self, record: EmbeddedProfile) -> dict[str, Any]:
+        if not self._profiles_left:
+            return {}
+        self._profiles_left -= 1
+        try:
+            return {"profile": self.profile(record.profile)}
+        except IccBrdfError as error:
+            return {"profile": {"error": str(error)}}
 
     def tag(self, profile: Profile, signature: str) -> dict[str, Any]:
         where = {"offset": profile.tag_offset(signature), "size": len(profile.tag_data(signature))}
@@ -57,7 +73,8 @@ class _Plain:
         names = [f.name for f in fields(record) if f.name != "signature"]
         # Channel counts that follow from a table are worth a line, before the fields that are stored.
         names = [n for n in ("inputs", "outputs") if hasattr(record, n) and n not in names] + names
-        return head | {name: self.value(getattr(record, name)) for name in names}
+        inside = self.embedded(record) if isinstance(record, EmbeddedProfile) else {}
+        return head | {name: self.value(getattr(record, name)) for name in names} | inside
 
     def value(self, value: Any) -> Any:
         if isinstance(value, np.ndarray):

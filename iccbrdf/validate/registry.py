@@ -100,11 +100,12 @@ TAGS: Mapping[str, Registered] = {
     "resp": Registered(("rcs2",)),
     "view": Registered(("view",)),
     "cicp": Registered(("cicp",)),
-    "CxF ": Registered(("zxml", "utf8", "zut8", "text")),
+    "CxF ": Registered(("zxml", "ZXML", "utf8", "zut8", "text")),
     "smap": Registered(("ehim", "enim")),
-    **dict.fromkeys(
-        ("bfd ", "crdi", "devs", "ps2s", "ps2i", "psd0", "psd1", "psd2", "psd3", "scrn", "ucrb"), Registered()
-    ),
+    "ICC5": Registered(("ICCp",)),
+    **{signature: Registered((signature,)) for signature in ("bfd ", "crdi", "devs", "scrn")},
+    **dict.fromkeys(("ps2s", "ps2i", "psd0", "psd1", "psd2", "psd3"), Registered(("data",))),
+    "ucrb": Registered(),
     **dict.fromkeys(
         ("cept", "csnm", "rfnm", "sdin", "minf", "miin", "psin", "sPCC", "gbd0", "gbd1", "gbd2", "gbd3"),
         Registered(),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import chain, islice
 from typing import Any, TypeAlias
 
+from iccbrdf.validate.classic import check_classic
 from iccbrdf.validate.conditions import check_conditions, check_media_white
 from iccbrdf.validate.findings import Finding, Place, finding
 from iccbrdf.validate.header import check_header, check_profile_id
@@ -31,6 +32,7 @@ CHECKS: tuple[Check, ...] = (
     check_required,
     check_texts,
     check_names,
+    check_classic,
     check_defaults,
     check_channels,
     check_elements,

@@ -82,6 +82,13 @@ _ROWS = (
     Rule("TAG-008", "warning", "A signature that is no registered one is not close to one either.",
          "ICC.2, 9.2"),
     Rule("TAG-009", "note", "The tag is a registered one; others read only by agreement.", "ICC.2, 9.2"),
+    Rule("TAG-010", "error", "A profile inside a tag can be read.", "ICC.2, 7"),
+    Rule("TAG-011", "warning", "A number that stands for a choice is a listed one.",
+         "ICC.1:2010, 10.2, 10.6, 10.12, 10.28; ICC.1:2001-04, 6.5.15"),
+    Rule("TAG-012", "warning", "The order of colorants names each device channel once.", "ICC.1:2010, 10.3"),
+    Rule("TAG-013", "error", "Named colours have a value for each device channel, or none.",
+         "ICC.1:2010, 10.15"),
+    Rule("TAG-014", "warning", "Named colours differ in their names.", "ICC.1:2010, 10.15"),
 
     Rule("REQ-001", "error", "There are a description and a copyright (tags desc, cprt).",
          "ICC.2, 8.2; ICC.1:2010, 8.2"),
@@ -99,7 +106,8 @@ _ROWS = (
     Rule("TXT-003", "warning", "Texts hold no control characters but tab and end of line.",
          "purpose of the tag"),
     Rule("TXT-004", "warning", "A text comes once in each language.", "ICC.1:2010, 10.13"),
-    Rule("TXT-005", "warning", "Text of textType is 7-bit ASCII.", "ICC.1:2010, 10.22"),
+    Rule("TXT-005", "warning", "Text of textType and textDescriptionType is 7-bit ASCII.",
+         "ICC.1:2010, 10.22; ICC.1:2001-04, 6.5.17"),
 
     Rule("MCS-001", "error", "The multiplex channel names are a tag array of UTF-8 texts.", "ICC.2, 9.2.85"),
     Rule("MCS-002", "error", "There are as many names as the header's multiplex space has channels.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from iccbrdf.icc import Mluc, PlainText, Utf8
+from iccbrdf.icc import Mluc, PlainText, TextDescription, Utf8
 from iccbrdf.validate.findings import Finding, Place, finding
 from iccbrdf.validate.subject import Subject
 
@@ -19,9 +19,9 @@ def check_texts(subject: Subject) -> Iterator[Finding]:
     for tag in subject.distinct:
         if isinstance(tag.value, Mluc):
             yield from _localised(tag.value, tag.place)
-        elif isinstance(tag.value, (PlainText, Utf8)):
+        elif isinstance(tag.value, (PlainText, TextDescription, Utf8)):
             yield from _text(tag.value.text, tag.place)
-            if isinstance(tag.value, PlainText) and not tag.value.text.isascii():
+            if not isinstance(tag.value, Utf8) and not tag.value.text.isascii():
                 yield finding("TXT-005", tag.place, "found bytes above 127, expected none")
 
 
