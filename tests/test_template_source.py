@@ -8,7 +8,7 @@ import pytest
 from iccbrdf.calc.compiler import compile_chain, compile_template
 from iccbrdf.calc.interpreter import run
 from iccbrdf.calc.source import Effect, Input, Output, When, parse
-from iccbrdf.errors import InputError
+from iccbrdf.errors import InputError, LimitError
 
 HEAD = "model test\n"
 
@@ -271,6 +271,31 @@ def numbers(expression, width=1, **tables):
 )
 def test_tables_have_columns_rows_and_sums_of_rows(expression, expected):
     assert numbers(expression, len(expected)) == expected
+
+
+DOUBLED = "let a0 = (x, 1)\n" + "".join(f"let a{k + 1} = (a{k}, a{k})\n" for k in range(40))
+NESTED = "let a0 = x\n" + "".join(
+    f"let a{k + 1} = if x > {k} {{ a{k} * 3 }} else {{ x }}\n" for k in range(70)
+)
+
+
+@pytest.mark.parametrize(
+    ("body", "found"),
+    [
+        ("output X = total k = 1 to 999999999 { x * k }", "asks for more than 131072 values up to here"),
+        (DOUBLED + "output X = sum(a40)", "asks for more than 131072 values up to here"),
+        (NESTED + "output X = a70", "conditions are nested more than 64 deep"),
+        ("output X = total k = 1 to 9000 { sin(x * k) }", "values, expected 16384 at most"),
+    ],
+)
+def test_templates_that_ask_for_too_much_are_refused(body, found):
+    with pytest.raises(LimitError, match=found):
+        compiled("input x\n" + body)
+
+
+def test_chains_are_not_endless():
+    with pytest.raises(LimitError, match="a chain of 17 templates, expected 16 at most"):
+        compile_chain([("model a\noutput X = 1", "a.calc")] * 17)
 
 
 def test_tables_are_as_long_as_what_is_given():

@@ -1,6 +1,7 @@
 """Every rule: a sound profile does not break it, and the least mistake breaks it and hardly any other."""
 
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,38 +21,40 @@ from validate_examples import (
     with_tag,
 )
 
+from iccbrdf.calc.program import Temporary, parse
 from iccbrdf.errors import ProfileWarning
 from iccbrdf.icc import (
     MCS_SUBSET,
     XYZ,
-    Clut,
-    CurveSet,
     Chromaticity,
-    FormulaSegment,
+    Clut,
     ColorantOrder,
     CompressedUtf8,
-    LocalisedText,
+    CurveSet,
     EmbeddedProfile,
+    FormulaSegment,
+    LocalisedText,
     Matrix,
+    Measurement,
     Mluc,
     MultiProcess,
-    Measurement,
-    NumberArray,
-    PlainText,
     NamedColour,
     NamedColours,
+    NumberArray,
+    PlainText,
     Profile,
-    SegmentedCurve,
-    TagArray,
     Screen,
     Screening,
+    SegmentedCurve,
+    TagArray,
+    TextDescription,
     Unknown,
     UnknownElement,
-    TextDescription,
     Utf8,
     ViewingConditions,
     read_profile,
 )
+from iccbrdf.icc.source_tag import CalculatorSource, Source
 from iccbrdf.resources import folder
 from iccbrdf.validate import RULES, validate, validate_pair
 
@@ -63,6 +66,32 @@ D65 = (0.95, 1.0, 1.09)
 def running(text, elements=()):
     """An MVIS with another program."""
     return sound_mvis(M2B0=program(text, 2, 3, elements))
+
+
+COMPILES = "output A B C = kd * m"
+
+
+def made_from(output, **fields):
+    """An MVIS that says what its program is compiled from, which is to be that of COMPILES."""
+    text = f"model one\ninput kd\ninput m\n{output}\n"
+    fields = {"inputs": ("kd", "m"), "outputs": ("A", "B", "C"), "templates": ((text, "one.calc"),), **fields}
+    tag = Source((CalculatorSource("M2B0", **fields),)).tag()
+    return sound_mvis(M2B0=program("in(0,2) mul copy(1,2) out(0,3)", 2, 3), bsrc=tag)
+
+
+def test_a_source_that_compiles_to_its_program():
+    assert fired(made_from(COMPILES)) == {"TAG-009"}
+
+
+def test_a_profile_whose_program_was_changed_is_told_of():
+    profile = read_profile(folder("profiles") / "fogra39_gloss" / "mvis.icc")
+    (calculator,) = profile["M2B0"].elements
+    other = replace(calculator, program=(*calculator.program, *parse("0 pop")))
+    report = validate(profile.replace(tags={"M2B0": MultiProcess.of(other)}).to_bytes())
+    (found,) = (finding for finding in report.findings if finding.rule.id == "SRC-002")
+    assert "tag M2B0, element 0: the source compiles to another program, of 137 operations, found 139" in (
+        found.text
+    )
 
 
 def transforming(*elements):
@@ -235,6 +264,14 @@ BROKEN = [
     ("TAG-007", lambda: sound_mid(M2B0=matrix(np.eye(3, 2))), ""),
     ("TAG-008", lambda: sound_mid(a2m0=matrix(np.eye(2))), ""),
     ("TAG-009", lambda: sound_mid(zzzz=XYZ.of(1, 1, 1)), ""),
+    ("TAG-010", lambda: sound_mid(ICC5=EmbeddedProfile(sound_mid().to_bytes()[:200])), ""),
+    ("TAG-011", lambda: sound_mid(chrm=Chromaticity(9, ())), ""),
+    ("TAG-011", lambda: sound_mid(meas=Measurement(1, (0, 0, 0), 3, 0.5, 1)), ""),
+    ("TAG-011", lambda: sound_mid(scrn=Screening(0, (Screen(150, 45, 8),))), ""),
+    ("TAG-012", lambda: sound_mid(clro=ColorantOrder((1, 1))), ""),
+    ("TAG-012", lambda: sound_mid(clro=ColorantOrder((1, 2, 3))), ""),
+    ("TAG-013", lambda: sound_mid(ncl2=NamedColours((NamedColour("a", (0, 0, 0), (1,)),), 1)), ""),
+    ("TAG-014", lambda: sound_mid(ncl2=NamedColours((NamedColour("a", (0, 0, 0)),) * 2)), ""),
     ("REQ-001", lambda: sound_mid().replace(remove=["desc"]), ""),
     ("REQ-001", lambda: sound_mid().replace(remove=["cprt"]), ""),
     ("REQ-002", lambda: sound_mvis().replace(remove=["wtpt"]), ""),
@@ -252,6 +289,7 @@ BROKEN = [
     ("TXT-002", lambda: sound_mid(desc=Mluc.of("text", "EN", "us")), ""),
     ("TXT-003", lambda: sound_mid(desc=Mluc.of("a\0b")), ""),
     ("TXT-004", lambda: sound_mid(desc=Mluc((LocalisedText("en", "GB", "colour"),) * 2)), ""),
+    ("TXT-005", lambda: changed(sound_mid(dmnd=TextDescription("é")), version=(5, 0, 0)), ""),
     ("TXT-005", lambda: sound_mid(cprt=PlainText("© me")), ""),
     ("MCS-001", lambda: sound_mid(mcta=TagArray("utf8", (Utf8("kd"), XYZ.of(1, 1, 1)))), ""),
     ("MCS-002", lambda: sound_mid(mcta=named("kd", "m", "n")), ""),
@@ -264,14 +302,6 @@ BROKEN = [
     ("MCS-008", lambda: sound_mvis(**{"mdv ": NumberArray("fl32", [1])}), ""),
     ("MCS-009", lambda: sound_mvis(**{"mdv ": NumberArray("fl32", [1, np.inf])}), ""),
     ("MPE-001", lambda: with_tag(sound_mvis(), "M2B1", matrix(np.eye(2)).to_bytes()), ""),
-    ("TAG-010", lambda: sound_mid(ICC5=EmbeddedProfile(sound_mid().to_bytes()[:200])), ""),
-    ("TAG-011", lambda: sound_mid(chrm=Chromaticity(9, ())), ""),
-    ("TAG-011", lambda: sound_mid(meas=Measurement(1, (0, 0, 0), 3, 0.5, 1)), ""),
-    ("TAG-011", lambda: sound_mid(scrn=Screening(0, (Screen(150, 45, 8),))), ""),
-    ("TAG-012", lambda: sound_mid(clro=ColorantOrder((1, 1))), ""),
-    ("TAG-012", lambda: sound_mid(clro=ColorantOrder((1, 2, 3))), ""),
-    ("TAG-013", lambda: sound_mid(ncl2=NamedColours((NamedColour("a", (0, 0, 0), (1,)),), 1)), ""),
-    ("TAG-014", lambda: sound_mid(ncl2=NamedColours((NamedColour("a", (0, 0, 0)),) * 2)), ""),
     ("MPE-001", lambda: under(D65, c2sp=matrix(np.eye(3, 2))), ""),
     ("MPE-001", lambda: changed(TABLE_V4, colour_space="6CLR"), ""),
     ("MPE-002", broken_chain, ""),
@@ -289,7 +319,6 @@ BROKEN = [
     ("PRG-001", lambda: tag_patched(sound_mvis(), "M2B0", 60, b"fnv "), ""),
     ("PRG-002", overstated, ""),
     ("PRG-003", lambda: running("env(ndef) pop in(0,2) out(1,2) out(0)"), ""),
-    ("TXT-005", lambda: changed(sound_mid(dmnd=TextDescription("é")), version=(5, 0, 0)), ""),
     ("PRG-004", lambda: running("env(litx) pop in(0,2) out(0,3)"), ""),
     ("PRG-005", lambda: running("env(6c697400) pop in(0,2) out(0,3)"), ""),
     ("PRG-006", lambda: running("in(0) copy(1,2) out(0,3)"), ""),
@@ -316,6 +345,15 @@ BROKEN = [
     ("PCC-006", lambda: under(D65, s2cp=matrix(np.eye(3))), ""),
     ("PCC-007", lambda: sound_mvis(wtpt=XYZ.of(0.9, 1, 0)), ""),
     ("ALL-001", lambda: sound_mid(**{f"{i:04d}": Mluc.of(str(i)) for i in range(1001)}), "TAG-009"),
+    ("SRC-001", lambda: sound_mvis(bsrc=CompressedUtf8.of("{")), "TAG-009"),
+    ("SRC-001", lambda: sound_mvis(bsrc=CompressedUtf8.of(" " * (1 << 20))), "TAG-009"),
+    ("SRC-002", lambda: made_from("output A B C = 2 * kd"), "TAG-009"),
+    ("SRC-002", lambda: made_from("output A B C = kb"), "TAG-009"),
+    ("SRC-002", lambda: made_from("output A B C = total k = 1 to 99999999 { kd / k }"), "TAG-009"),
+    ("SRC-002", lambda: made_from(COMPILES, inputs=("kd", "ks")), "TAG-009"),
+    ("SRC-002", lambda: made_from(COMPILES, outputs=("A", "B", "C", "D")), "TAG-009"),
+    ("SRC-002", lambda: made_from(COMPILES, element=1), "TAG-009"),
+    ("SRC-002", lambda: made_from(COMPILES, temporaries=(Temporary("half", 0),)), "TAG-009"),
 ]  # fmt: skip
 """A rule, what breaks it, and the rules that break with it."""
 

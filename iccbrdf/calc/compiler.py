@@ -14,7 +14,13 @@ from iccbrdf.calc.passes import Report, optimise
 from iccbrdf.calc.program import Program, Temporary
 from iccbrdf.calc.source import parse
 from iccbrdf.calc.verify import verify
-from iccbrdf.errors import InputError
+from iccbrdf.errors import InputError, LimitError
+
+MAX_TEMPLATES = 16
+"""In a chain."""
+
+MAX_NODES = 1 << 14
+"""Values that a program computes; the time that they take to compile grows with their square."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +90,8 @@ def compile_template(
     InputError
         An error in the template at file:line:column, a table that is not given, or a constant, choice,
         effect or run-time variable that it does not declare, with the nearest that it does.
+    LimitError
+        It asks for more values than a program of ours could need.
     """
     return compile_chain([(text, filename)], constants=constants, effects=effects, variables=variables)
 
@@ -113,17 +121,23 @@ def compile_chain(
     ------
     InputError
         As `compile_template`, or no template.
+    LimitError
+        More than MAX_TEMPLATES templates, or more values than a program of ours could need.
     """
     if not templates:
         raise InputError("found no template to compile, expected one or more")
+    if len(templates) > MAX_TEMPLATES:
+        raise LimitError(f"found a chain of {len(templates)} templates, expected {MAX_TEMPLATES} at most")
     filenames = ", ".join(filename for _, filename in templates)
     try:
         parsed = [parse(text, filename) for text, filename in templates]
         lowered = lower(parsed, Settings(constants or {}, effects or {}, variables or {}))
+        graph, report = optimise(lowered.graph)
+        if len(graph.nodes) > MAX_NODES:
+            raise LimitError(f"{filenames}: found {len(graph.nodes)} values, expected {MAX_NODES} at most")
+        program, temporaries = emit(graph)
     except RecursionError:
         raise InputError(f"{filenames}: expressions are nested too deeply; use `let` for parts") from None
-    graph, report = optimise(lowered.graph)
-    program, temporaries = emit(graph)
     checked = verify(program, len(lowered.inputs), len(lowered.outputs), where=filenames)
     return Compiled(
         model=" ".join(lowered.models),

@@ -26,7 +26,7 @@ import numpy as np
 
 from iccbrdf.calc.graph import Graph, Node, is_elementwise, needed_by, takes
 from iccbrdf.calc.operators import OPERATORS, Kind, Operand
-from iccbrdf.calc.program import Op, Program, Temporary
+from iccbrdf.calc.program import MAX_NESTING, Op, Program, Temporary
 from iccbrdf.errors import LimitError
 
 _BY_SCALAR = {"add": "sadd", "sub": "ssub", "mul": "smul", "div": "sdiv", "pow": "gama"}
@@ -339,6 +339,8 @@ def _homes(graph: Graph, live: Sequence[Node]) -> dict[Node, _Path]:
     """The innermost side of a select that contains all uses of a node."""
     homes: dict[Node, _Path] = dict.fromkeys(graph.outputs, ())
     for node in reversed(live):
+        if len(homes[node]) > MAX_NESTING:
+            raise LimitError(f"conditions are nested more than {MAX_NESTING} deep")
         for position, argument in enumerate(node.arguments):
             home = homes[node]
             if node.op == "select" and position > 0:

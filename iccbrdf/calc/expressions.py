@@ -33,13 +33,20 @@ from iccbrdf.calc.source import (
     Total,
     Vector,
 )
-from iccbrdf.errors import nearest
+from iccbrdf.errors import LimitError, nearest
 
 TINY = 1e-37
 """What `normalize` adds to a squared length, so that a vector of no length becomes 0 and not NaN.
 
 Above the smallest normal float32, and far below the square of any length that a direction has.
 """
+
+MAX_WORK = 1 << 17
+"""Components that the expressions of a template have in all: a short text could ask for endless ones.
+Templates of ours need a quarter."""
+
+_NAMES_FOR_ONE = 16
+"""Names that a block sees take as much work as one component."""
 
 _COMPONENTS = {"x": 0, "y": 1, "z": 2, "X": 0, "Y": 1, "Z": 2}
 
@@ -80,15 +87,32 @@ class Expressions:
         self._functions: dict[str, _Function] = {}
         self._expanding: list[str] = []
         self._numbers: dict[Node, tuple[float, ...] | None] = {}
+        self._work = 0
 
     def define(self, definition: Def, names: Mapping[str, Named]) -> None:
         """Make a function known that sees these names."""
         if definition.name in self._functions or definition.name in FUNCTIONS or definition.name in _EACH:
             raise definition.place.error(f"a function {definition.name!r} is there already")
-        self._functions[definition.name] = _Function(definition, dict(names))
+        self._functions[definition.name] = _Function(definition, self._seen(names, definition.place))
 
     def value(self, expression: Expression, names: Mapping[str, Named]) -> Node:
         """The value of an expression in which `names` stand for what they do."""
+        value = self._value(expression, names)
+        self._spend(value.width, expression.place)
+        return value
+
+    def _spend(self, work: int, place: Place) -> None:
+        self._work += work
+        if self._work > MAX_WORK:
+            message = f"the template asks for more than {MAX_WORK} values up to here"
+            raise LimitError(str(place.error(message)))
+
+    def _seen(self, names: Mapping[str, Named], place: Place) -> dict[str, Named]:
+        """What a block sees of the names around it, to which it adds its own."""
+        self._spend(len(names) // _NAMES_FOR_ONE, place)
+        return dict(names)
+
+    def _value(self, expression: Expression, names: Mapping[str, Named]) -> Node:
         if isinstance(expression, Number):
             return self._graph.const(expression.value)
         if isinstance(expression, Name):
@@ -102,7 +126,7 @@ class Expressions:
         if isinstance(expression, Slice):
             return self._slice(expression, names)
         if isinstance(expression, Block):
-            inner = dict(names)
+            inner = self._seen(names, expression.place)
             for let in expression.lets:
                 self.let(let, inner)
             return self.value(expression.value, inner)
@@ -224,7 +248,7 @@ class Expressions:
             raise total.place.error(f"a total from {first} to {last} has nothing to add up")
         values = []
         for index in range(first, last + 1):
-            inner = dict(names)
+            inner = self._seen(names, total.place)
             bind(inner, total.place, total.name, self._graph.const(index))
             values.append(self.value(total.body, inner))
         return reduce(
@@ -262,6 +286,7 @@ class Expressions:
             raise call.place.error(
                 f"found {weights.width} component(s) before '@', expected {len(table.rows)}, one for each row"
             )
+        self._spend(len(table.rows) * len(table.rows[0]), call.place)
         columns = [self._graph.const(*column) for column in zip(*table.rows, strict=True)]
         products = [self._reduce("sum", self._graph.add("mul", [weights, column])) for column in columns]
         return products[0] if len(products) == 1 else self._graph.pack(products)
@@ -271,7 +296,8 @@ class Expressions:
         self._expect_arguments(call, (len(definition.parameters),))
         if definition.name in self._expanding:
             raise call.place.error(f"{definition.name} calls itself; there is no recursion")
-        names = {**function.names, **dict(zip(definition.parameters, arguments, strict=True))}
+        names = self._seen(function.names, call.place)
+        names |= zip(definition.parameters, arguments, strict=True)
         self._expanding.append(definition.name)
         value = self.value(definition.body, names)
         self._expanding.pop()

@@ -41,8 +41,10 @@ if TYPE_CHECKING:
 
 SIGNATURE = "bsrc"
 SCHEMA = "iccbrdf.source/1"
-MAX_TEXT = 1 << 20
-"""Bytes of the tag's text."""
+MAX_TEXT = 1 << 17
+"""Bytes of the tag's text, which takes seconds to compile; ours has a tenth."""
+MAX_CALCULATORS = 4
+"""Calculators that a tag tells about."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ class Source:
 def read_source(profile: Mapping[str, Any]) -> Source:
     """What the tag of a profile holds; nothing where it has none.
 
-    Raises ProfileError where the tag is not as this module writes it, LimitError beyond MAX_TEXT bytes.
+    Raises ProfileError where the tag is not as this module writes it, LimitError beyond the limits.
     """
     if SIGNATURE not in profile:
         return Source()
@@ -145,8 +147,10 @@ def read_source(profile: Mapping[str, Any]) -> Source:
         data = json.loads(_text(profile[SIGNATURE]), parse_constant=_refuse)
         if not isinstance(data, dict) or data.get("schema") != SCHEMA:
             raise ValueError(f"expected a JSON object with the schema {SCHEMA!r}")
-        calculators = tuple(_calculator(item) for item in _list(data, "calculators", dict))
-        return Source(calculators, _dict(data, "recipe"))
+        items = _list(data, "calculators", dict)
+        if len(items) > MAX_CALCULATORS:
+            raise LimitError(f"found {len(items)} calculators, expected {MAX_CALCULATORS} at most")
+        return Source(tuple(map(_calculator, items)), _dict(data, "recipe"))
     except (ValueError, RecursionError, UsageError, ProfileError) as error:
         raise ProfileError(f"tag {SIGNATURE}: {error}") from None
     except LimitError as error:

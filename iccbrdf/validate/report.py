@@ -15,6 +15,7 @@ from iccbrdf.validate.multiplex import check_defaults, check_names
 from iccbrdf.validate.pair import check_pair, is_pair
 from iccbrdf.validate.programs import check_programs
 from iccbrdf.validate.rules import SEVERITIES, Severity
+from iccbrdf.validate.source import check_source
 from iccbrdf.validate.subject import Subject, open_subject
 from iccbrdf.validate.table import check_table
 from iccbrdf.validate.tags import check_required, check_tags
@@ -31,12 +32,13 @@ CHECKS: tuple[Check, ...] = (
     check_tags,
     check_required,
     check_texts,
-    check_names,
     check_classic,
+    check_names,
     check_defaults,
     check_channels,
     check_elements,
     check_programs,
+    check_source,
     check_conditions,
     check_media_white,
 )

@@ -3,8 +3,8 @@
 Ids are stable: a rule that is given up leaves a gap.  The first three letters name the area: HDR header,
 PID profile ID, TAB tag table, TAG tags and their types, REQ required tags, TXT texts, MCS multiplex channels,
 MPE processing elements, PRG calculator programs, REF behaviour of the reference implementation that a
-portable profile avoids, NUM numbers, where that check is asked for, PCC viewing conditions, LNK a MID with an
-MVIS, ALL the check itself.
+portable profile avoids, SRC the private tag of what programs are compiled from, NUM numbers, where that check
+is asked for, PCC viewing conditions, LNK a MID with an MVIS, ALL the check itself.
 """
 
 from __future__ import annotations
@@ -163,6 +163,11 @@ _ROWS = (
          f"{_REFERENCE}: other shapes give zeros or fail"),
     Rule("REF-003", "warning", "No block that is empty at the end of a sequence.",
          f"{_REFERENCE}: 'else' gives -1 on all outputs, 'case' and 'dflt' are refused"),
+
+    Rule("SRC-001", "warning", "The tag of what a profile is made from (bsrc) can be read.",
+         "iccbrdf.icc.source_tag: XML and plans are without names and recipe otherwise"),
+    Rule("SRC-002", "warning", "What a program is said to be made from compiles to that program, and to its "
+         "names.", "what the tag is for"),
 
     Rule("NUM-001", "error", "No operation divides by 0 for any input in the declared ranges.", _NUMERIC),
     Rule("NUM-002", "error", "No operation is given what it has no result for, as a root is of a negative "
