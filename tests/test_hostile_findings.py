@@ -1,6 +1,8 @@
 """What fuzzing and looking for trouble have found, each as the smallest change to something sound."""
 
 import io
+import json
+import os
 import struct
 
 import numpy as np
@@ -13,8 +15,10 @@ from fuzz.watch import time_limit
 import iccbrdf
 from iccbrdf.brdf import records
 from iccbrdf.brdf.primaries import read_primaries
+from iccbrdf.calc import compile_template
 from iccbrdf.calc.program import Op
-from iccbrdf.errors import InputError, LimitError, ProfileError
+from iccbrdf.cmm.environment import checked_environment
+from iccbrdf.errors import InputError, LimitError, ProfileError, UnsupportedError, VariableError
 from iccbrdf.icc import (
     Calculator,
     Clut,
@@ -28,9 +32,14 @@ from iccbrdf.icc import (
 from iccbrdf.icc.layout import Record
 from iccbrdf.icc.xml import node, profile_from_xml
 from iccbrdf.images import open_tiff
+from iccbrdf.images.exr import open_exr
+from iccbrdf.images.exr_header import check_header
 from iccbrdf.measure import declarations, parse_declarations, read_declarations, read_measurements, tables
 from iccbrdf.proof import job
+from iccbrdf.proof.colour_in import ColourIn
+from iccbrdf.proof.log import earlier
 from iccbrdf.resources import folder
+from iccbrdf.viewer import read_folder
 
 PRIMARIES = folder("profiles") / "fogra39_gloss" / "primaries.json"
 DEEP = "[" * 5000
@@ -193,3 +202,121 @@ def test_what_took_the_square_of_its_size(tmp_path):
     wide.write_text(f"a,{names},a,c7\n" + ",".join(["1"] * 20_003))
     with pytest.raises(InputError, match="the column 'a' stands twice"):
         read_measurements(wide)
+
+
+def test_numbers_of_toml_that_are_too_long_to_be_shown(tmp_path):
+    """A hexadecimal number may have any number of digits, a decimal one of Python 4,300."""
+    path, table = tmp_path / "a.toml", tmp_path / "a.csv"
+    number = "0x" + "f" * 6000
+    path.write_text(f'image = "a"\nprimaries = "b"\nframes = {number}\nscale = {number}\n')
+    table.write_text(f'# schema = "iccbrdf-measurements"\n# version = {number}\npatch,X,Y,Z\np,1,1,1\n')
+    for read, file in ((job.read_job, path), (read_declarations, path), (read_measurements, table)):
+        with pytest.raises(InputError, match="is not TOML: Exceeds the limit"):
+            read(file)
+    with pytest.raises(VariableError, match="litX': found inf"):
+        checked_environment({"litX": 10**5000}, ["litX"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (b"1.5", b"0", "exposure is 0.0, expected a number above 0"),
+        (b"1.5", b"NaN", "found nan, expected a finite number"),
+        (b"4.5", b"1e999", "found inf, expected a finite number"),
+        (b"4.5", b"1" + b"0" * 400, "OverflowError"),
+        (b"0.25", DEEP.encode(), "RecursionError"),
+        (b'"scenes": [', b'"scenes": [[], ', "TypeError"),
+    ],
+)
+def test_logs_of_proofs(tmp_path, old, new, message):
+    data = seeds.logs()[0]
+    assert old in data
+    (tmp_path / "proof.json").write_bytes(data.replace(old, new))
+    with pytest.raises(InputError, match=f"proof.json: is not the log of a proof: .*{message}"):
+        read_folder(tmp_path)
+
+
+@pytest.mark.parametrize("new", [b"NaN", b'"much"', b"2", b"null", DEEP.encode()])
+def test_logs_that_do_not_say_that_a_job_is_done(tmp_path, new):
+    (tmp_path / "flat.tif").touch()
+    made = job.make_job({"image": "a.tif", "primaries": "p.json", "output": str(tmp_path)})
+    data = seeds.logs()[0]
+    for found, is_done in ((data, True), (data.replace(b"0.25", new), False)):
+        (tmp_path / "proof.json").write_bytes(found)
+        assert (earlier(made, "0") is not None) is is_done
+
+
+def test_file_names_that_are_no_text(run, tmp_path):
+    """Bytes in them that are no UTF-8, on the way into documents, which are."""
+    name = os.fsdecode(b"caf\xe9")
+    rows = seeds.fitted_tables()[0]
+    (tmp_path / f"{name}.csv").write_bytes(rows)
+    assert run("fit", tmp_path / f"{name}.csv", "-o", tmp_path / "p.json", "--starts", "1").code == 0
+    assert "caf?.csv" in read_primaries(tmp_path / "p.json").source
+    tifffile.imwrite(tmp_path / f"{name}.tif", np.zeros((2, 3, 10), np.uint8), planarconfig="contig")
+    pair = (PRIMARIES.with_name(file) for file in ("mid.icc", "mvis.icc"))
+    profiles = [word for path in pair for word in ("-p", path)]
+    assert run("view", tmp_path / f"{name}.tif", *profiles, "-o", tmp_path / "a.html").code == 0
+    assert "<title>caf?" in (tmp_path / "a.html").read_text(encoding="utf-8")
+
+
+def test_text_of_json_that_no_file_can_hold(tmp_path):
+    data = json.loads(PRIMARIES.read_text())
+    data["source"] = "\ud800"
+    (tmp_path / "p.json").write_text(json.dumps(data))
+    with pytest.raises(InputError, match=r"source is '\\ud800', expected Unicode text"):
+        read_primaries(tmp_path / "p.json")
+
+
+def test_an_embedded_profile_that_is_stored_as_a_number(tmp_path):
+    """It was taken for so many bytes, up to 4 GiB of them."""
+    path = tmp_path / "a.tif"
+    extra = [(34675, "I", 1, 2**32 - 1, True)]
+    tifffile.imwrite(path, np.zeros((2, 3), np.uint8), photometric="minisblack", extratags=extra)
+    with pytest.raises(InputError, match="the embedded profile is stored as numbers, expected bytes"):
+        open_tiff(path)
+
+
+def test_lab_beyond_float32(tmp_path):
+    path = tmp_path / "a.tif"
+    tifffile.imwrite(path, np.full((1, 1, 3), 3e38, np.float32), photometric="cielab", metadata=None)
+    with ColourIn(path, None, read_primaries(PRIMARIES)) as image:
+        (place,) = image.places()
+        assert not np.isfinite(image.read(place).data).all()
+
+
+def test_an_output_that_is_named_twice_at_a_time():
+    template = seeds.templates()[-1].decode()
+    with pytest.raises(InputError, match="channel 'X' is written by an output already"):
+        compile_template(template.replace("output X Y Z", "output X X Z"), filename="a.calc")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (b"pixelAspectRatio", b"pixelAspectRat\xff\xff", "expected UTF-8"),  # it brought the process down
+        (b"kd.X", b"kd.\xff", "expected UTF-8"),
+        (b"comments\0string\0", b"comments\0strange\0", None),
+        (b"v/1\x01\x02\0", b"v/1\x01\x02\x10", "several parts"),
+        (b"chlist\0", b"chlist\0\xff\xff\xff", "cut off"),
+        (b"v/1\x01", b"v/2\x01", "cannot be read as OpenEXR"),
+    ],
+)
+def test_headers_of_openexr(tmp_path, old, new, message):
+    pytest.importorskip("OpenEXR", reason="OpenEXR is not installed")
+    path, data = tmp_path / "a.exr", seeds.exrs()[0]
+    assert old in data
+    path.write_bytes(data.replace(old, new))
+    if message is None:
+        assert open_exr(path).names == ("kd.X", "m", "n.z")
+        return
+    with pytest.raises((InputError, UnsupportedError), match=message):
+        open_exr(path)
+
+
+def test_headers_of_openexr_have_a_size_at_most(tmp_path):
+    path, data = tmp_path / "a.exr", seeds.exrs()[0]
+    long = b"a\0string\0" + (2**20).to_bytes(4, "little") + b" " * 2**20
+    path.write_bytes(data[:8] + long + data[8:])
+    with pytest.raises(LimitError, match="the header is larger than the limit of 1048576 bytes"):
+        check_header(path)

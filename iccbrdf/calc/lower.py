@@ -305,8 +305,8 @@ class _Lowering:
             raise table.place.error(f"{table.name} has {length} {what}, expected {expected}{reason}")
 
     def _output(self, output: Output) -> Node:
-        for channel in output.channels:
-            if channel in self._written:
+        for index, channel in enumerate(output.channels):
+            if channel in self._written or channel in output.channels[:index]:
                 raise output.place.error(f"channel {channel!r} is written by an output already")
         value = self._expressions.value(output.value, self._globals)
         value = self._expressions.widen(value, len(output.channels), output.place)

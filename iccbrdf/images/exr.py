@@ -18,6 +18,7 @@ import numpy as np
 from iccbrdf.errors import InputError, LimitError, UnsupportedError, UsageError, nearest
 from iccbrdf.files import StrPath, atomic_output
 from iccbrdf.images.blocks import Assembler, Block, Coverage, Grid, Place
+from iccbrdf.images.exr_header import check_header
 from iccbrdf.images.record import SAMPLES, Record, Samples, from_description
 
 MAX_CHANNELS = 256
@@ -82,6 +83,7 @@ class ExrSource:
             raise UsageError(f"{path}: unknown samples {samples!r}: {nearest(samples, SAMPLES)}")
         self._path = path
         self._exr, self._imath = _package()
+        check_header(path)
         try:
             self._file = self._exr.InputFile(str(path))
             header = self._file.header()
@@ -275,5 +277,8 @@ def _package() -> tuple[Any, Any]:
         raise UsageError("OpenEXR files need the package OpenEXR: pip install iccbrdf[exr]") from None
 
 
-def _text(value: bytes | str) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+def _text(value: object) -> str:
+    """The text of an attribute, which in a damaged file is of any type."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    return value if isinstance(value, str) else ""

@@ -93,6 +93,10 @@ class TiffStorage:
         self.dtype = _sample_type(page, self._file.byteorder, path)
         self.description: str = page.description
         self.profile: bytes | None = page.iccprofile
+        if not isinstance(self.profile, bytes | None):
+            raise InputError(
+                f"{path}: damaged TIFF: the embedded profile is stored as numbers, expected bytes"
+            )
         self.photometric: str = page.photometric.name
         self.extra_samples = len(page.extrasamples)
         self.ink_set: int = page.tags.valueof(332, 1)

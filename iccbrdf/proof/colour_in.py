@@ -104,7 +104,9 @@ class ColourIn:
     def read(self, place: Place) -> Block:
         """The XYZ at a place, float32; several threads may read at a time."""
         block = self._tiff.read(place)
-        return block._replace(data=self._to_XYZ(block.data))
+        # What is not finite is counted where it is computed with.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return block._replace(data=self._to_XYZ(block.data))
 
     @property
     def summary(self) -> dict[str, Any]:
