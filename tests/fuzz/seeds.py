@@ -17,7 +17,8 @@ import tifffile
 import xml_examples
 
 from iccbrdf.calc.program import encode_ops, parse
-from iccbrdf.icc import XYZ, Curve, ExtendedClut, Header, LutAToB, Profile
+from iccbrdf.icc import XYZ, Curve, ExtendedClut, Header, LutAToB, Profile, read_profile
+from iccbrdf.icc.source_tag import SIGNATURE
 from iccbrdf.icc.xml import profile_to_xml
 from iccbrdf.images.blocks import Block
 from iccbrdf.images.exr import create_exr
@@ -151,6 +152,12 @@ def templates() -> list[bytes]:
     """Models in the source language."""
     names = ("cook_torrance", "ward")
     return [(folder("calc_templates") / f"{name}.calc").read_bytes() for name in names]
+
+
+def sources() -> list[bytes]:
+    """What the source tags of an MVIS and of a colour MID say."""
+    profiles = (read_profile(_HERE / name) for name in ("mvis.icc", "colour-mid.icc"))
+    return [profile[SIGNATURE].text.encode() for profile in profiles]
 
 
 def arguments() -> list[bytes]:

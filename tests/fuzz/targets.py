@@ -21,6 +21,8 @@ from fuzz import seeds
 from iccbrdf.brdf.primaries import Primaries, read_primaries
 from iccbrdf.brdf.slopes import read_slopes
 from iccbrdf.build import build_colour_mid, build_pair
+from iccbrdf.build.recipe import recipe_of
+from iccbrdf.build.source import recompiled, with_effects
 from iccbrdf.calc import compile_template
 from iccbrdf.calc.operators import OPERATORS
 from iccbrdf.calc.program import decode_ops, listing
@@ -56,6 +58,7 @@ from iccbrdf.icc import (
     to_dict,
 )
 from iccbrdf.icc.compare import compare
+from iccbrdf.icc.source_tag import SIGNATURE, read_source
 from iccbrdf.icc.xml import profile_from_xml, profile_to_xml
 from iccbrdf.images import ImageSource, open_tiff, read_height_map, read_normal_map
 from iccbrdf.images.exr import open_exr
@@ -191,6 +194,30 @@ def template(data: bytes) -> bool:
     except OF_FILES:
         return False
     return True
+
+
+def source(data: bytes) -> bool:
+    """What a profile says it was made from: read, validated, compiled again, written as XML."""
+    try:
+        tag = CompressedUtf8.of(data.decode("utf-8", "replace"))
+        profile = Profile.from_bytes(_PAIR[1]).replace(tags={SIGNATURE: tag})
+        validate(profile.to_bytes(), "a.icc")
+        profile_to_xml(profile)
+        calculators = read_source(profile).calculators
+    except OF_PROFILES:
+        return False
+    taken = 0
+    for use in (
+        lambda: [recompiled(calculator) for calculator in calculators],
+        lambda: with_effects([profile], {"fresnel": False}),
+        lambda: recipe_of([Profile.from_bytes(_PAIR[0]), profile]),
+    ):
+        try:
+            use()
+            taken += 1
+        except (*OF_PROFILES, InputError):
+            continue
+    return taken > 0
 
 
 def packed(data: bytes) -> bool:
@@ -443,6 +470,7 @@ TARGETS = {
     "tiff": Target(tiff, seeds.tiffs),
     "picture": Target(picture, seeds.pictures, (b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND", b"iCCP")),
     "template": Target(template, seeds.templates, _LANGUAGE),
+    "source": Target(source, seeds.sources, (*_NAMES, *_LANGUAGE)),
     "packed": Target(packed, seeds.packed),
     "page": Target(page, seeds.page_profiles, (*_TYPES, *_OPERATORS, b"</script>", b"{{page}}", b"*/")),
     "display": Target(device_profile, seeds.device_profiles, (*_TYPES, b"mft1", b"mft2", b"mAB ", b"para")),
