@@ -16,11 +16,13 @@ import numpy as np
 import pytest
 import tifffile
 from cmm_examples import device_profile, matrix
+from fuzz import seeds
 
 import iccbrdf
 from iccbrdf.icc import read_profile, write_profile
 from iccbrdf.icc.xml import profile_to_xml
 from iccbrdf.images.tiff_storage import TiffStorage
+from iccbrdf.report.plots import PICTURES
 from iccbrdf.resources import folder
 
 HERE = folder("profiles") / "fogra39_gloss"
@@ -81,9 +83,12 @@ def files_up_to(size):
 
 
 @pytest.mark.parametrize(
-    "options", [["xyz.tif"], ["proof.png"], ["xyz.tif", "proof.png"], ["xyz.tif", "--compression", "zstd"]]
+    "options",
+    [["xyz.tif"], ["proof.png"], ["xyz.tif", "proof.png"], ["xyz.tif", "--compression", "zstd"], ["xyz.exr"]],
 )
 def test_apply_on_a_full_disk(run, tmp_path, options):
+    if "xyz.exr" in options:
+        pytest.importorskip("OpenEXR", reason="OpenEXR is not installed")
     image = an_image(tmp_path / "image.tif", 200, 300)
     outputs = [part for name in options if "." in name for part in ("-o", tmp_path / name)]
     more = [option for option in options if "." not in option]
@@ -109,6 +114,8 @@ def results_of(tmp_path):
     xml = tmp_path / "in.xml"
     xml.write_bytes(profile_to_xml(read_profile(MVIS)))
     image = an_image(tmp_path / "in.tif", 8, 9)
+    job = tmp_path / "job.tif"
+    job.write_bytes(seeds.print_jobs()[0])
     out = tmp_path / "out"
     return {
         "build": (["build", PRIMARIES, "-o", out], "mvis.icc"),
@@ -119,10 +126,19 @@ def results_of(tmp_path):
         "simulate": (["simulate", "-o", out], "primaries.csv"),
         "demo": (["demo", "-o", out], "relief.tif"),
         "view": (["view", image, *PAIR, "-o", out / "a.html"], "a.html"),
+        "proof": (["proof", job, "--primaries", PRIMARIES, "-o", out, "--keep", "xyz"], "xyz.tif"),
+        "cost": (["cost", image, "--primaries", PRIMARIES, "-o", out, "--runs", "1"], "cost.png"),
+        "evaluate": (["evaluate", tmp_path, "--plots", out], next(iter(PICTURES))),
     }
 
 
-@pytest.mark.parametrize("name", ["build", "xml", "icc", "fit"])
+COMMANDS = (
+    "build", "apply", "xml", "icc", "fit", "simulate", "demo", "view", "proof", "cost", "evaluate"
+)  # fmt: skip
+"""That write files: those of `results_of`."""
+
+
+@pytest.mark.parametrize("name", ["build", "xml", "icc", "fit", "simulate", "view", "proof"])
 def test_commands_on_a_full_disk(run, tmp_path, name):
     arguments, _ = results_of(tmp_path)[name]
     (tmp_path / "out").mkdir()
@@ -136,7 +152,7 @@ def test_commands_on_a_full_disk(run, tmp_path, name):
 # Results in the way --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["build", "apply", "xml", "icc", "fit", "simulate", "demo", "view"])
+@pytest.mark.parametrize("name", COMMANDS)
 def test_nothing_is_overwritten_unless_asked(run, tmp_path, name):
     arguments, file = results_of(tmp_path)[name]
     out = tmp_path / "out"
@@ -150,13 +166,25 @@ def test_nothing_is_overwritten_unless_asked(run, tmp_path, name):
 
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder that nobody can write to")
-@pytest.mark.parametrize("name", ["build", "apply", "xml", "icc", "fit"])
+@pytest.mark.parametrize("name", ["build", "apply", "xml", "icc", "fit", "simulate", "view", "proof"])
 def test_a_folder_that_cannot_be_written(run, tmp_path, name):
     arguments, _ = results_of(tmp_path)[name]
     nowhere = [Path(str(a).replace(str(tmp_path / "out"), "/proc/self")) for a in arguments]
     result = run(*nowhere)
     assert result.code == 2, result.err
     assert "cannot be written" in result.err
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_folder_that_cannot_be_made(run, tmp_path, name):
+    """A file is in its way, which stays as it is."""
+    arguments, _ = results_of(tmp_path)[name]
+    out = tmp_path / "out"
+    out.write_bytes(b"mine")
+    result = run(*arguments)
+    assert result.code == 2, result.err
+    assert str(out) in result.err
+    assert out.read_bytes() == b"mine"
 
 
 # Inputs that shrink --------------------------------------------------------------------------------------

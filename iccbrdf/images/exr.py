@@ -6,7 +6,9 @@ names; the record in the attribute `comments` (`iccbrdf.images.record`) keeps ou
 
 from __future__ import annotations
 
+import errno
 import importlib
+import os
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -205,7 +207,8 @@ class ExrSink:
                 raise UsageError(f"{self._path}: a block at row {block.y0} came before those above it")
             self._next_band += 1
             planes = {name: rows[:, :, i].tobytes() for i, name in enumerate(self._names)}
-            self._file.writePixels(planes, len(rows))
+            with _numbered(self._path):
+                self._file.writePixels(planes, len(rows))
 
     def finish(self) -> None:
         """UsageError where pixels are missing."""
@@ -261,13 +264,25 @@ def create_exr(
         "comments": Record(samples, tuple(names)).to_description().encode(),
     }
     with atomic_output(path, overwrite=overwrite) as temporary:
-        file = exr.OutputFile(str(temporary), header)
+        with _numbered(path):
+            file = exr.OutputFile(str(temporary), header)
         try:
             sink = ExrSink(file, path, height, width, names, np.dtype(dtype))
             yield sink
             sink.finish()
         finally:
             file.close()
+
+
+@contextmanager
+def _numbered(path: StrPath) -> Iterator[None]:
+    """Give the errors of the package, which are text alone, the number that their text stands for."""
+    try:
+        yield
+    except OSError as error:
+        text = str(error)
+        number = next((n for n in errno.errorcode if os.strerror(n) in text), errno.EIO)
+        raise OSError(number, os.strerror(number), os.fspath(path)) from error
 
 
 def _package() -> tuple[Any, Any]:
