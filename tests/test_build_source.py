@@ -13,12 +13,12 @@ import iccbrdf
 from iccbrdf.build import MODELS, build_colour_mid
 from iccbrdf.build.effects import chosen_effects
 from iccbrdf.build.literal import literal_mvis
-from iccbrdf.build.recipe import Recipe, left_out
+from iccbrdf.build.recipe import Recipe
 from iccbrdf.build.recipe import recipe_of as recipe_of_profiles
-from iccbrdf.build.source import recompiled
+from iccbrdf.build.source import left_out, recompiled, with_effects
 from iccbrdf.calc import encode_ops
 from iccbrdf.errors import InputError, ProfileError, UsageError
-from iccbrdf.icc import Calculator, CompressedUtf8, Profile
+from iccbrdf.icc import Calculator, Profile
 from iccbrdf.icc.source_tag import SIGNATURE, Source, read_source
 
 
@@ -52,7 +52,7 @@ def test_every_colour_mid_compiles_to_the_same_bytes_again(interpolation, withou
     mid = recipe.colour_mid(without).mid
     ((stored, again),) = calculators(mid)
     assert stored == again
-    assert left_out([mid]) == tuple(name for name in ("slope", "interpolation") if name in without)
+    assert gone(mid) == tuple(name for name in ("slope", "interpolation") if name in without)
 
 
 def test_the_tag_does_not_change_what_is_computed(tmp_path):
@@ -108,7 +108,7 @@ def test_the_recipe_of_a_pair_is_without_the_primaries():
     pair = Recipe(other).pair(["fresnel", "relief"])
     found = recipe_of_profiles([pair.mid, pair.mvis])
     assert found.primaries.primaries == ()
-    assert left_out([pair.mid, pair.mvis]) == ("fresnel", "relief")
+    assert gone(pair.mvis) == ("fresnel", "relief")
     full = Recipe(other, with_source=False).pair()
     again = replace(found, with_source=False).pair()
     assert [p.to_bytes() for p in (full.mid, full.mvis)] == [p.to_bytes() for p in (again.mid, again.mvis)]
@@ -142,11 +142,37 @@ def with_recipe(changes):
     return [p.replace(tags={SIGNATURE: Source((), recipe).tag()}) for p in (pair.mid, pair.mvis)]
 
 
+def gone(profile):
+    return left_out(read_source(profile).recipe)
+
+
 def test_effects_left_out_that_are_none_do_not_count():
-    tag = CompressedUtf8.of('{"schema": "iccbrdf.source/1", "recipe": {"without": ["gloss", 1, "relief"]}}')
-    assert left_out([PRINT.pair().mid.replace(tags={SIGNATURE: tag})]) == ("relief",)
-    tag = CompressedUtf8.of('{"schema": "iccbrdf.source/1", "recipe": {"without": 1}}')
-    assert left_out([PRINT.pair().mid.replace(tags={SIGNATURE: tag})]) == ()
+    assert left_out({"without": ["gloss", 1, "relief"]}) == ("relief",)
+    assert left_out({"without": 1}) == left_out({}) == ()
+
+
+def test_effects_of_programs_can_be_switched():
+    """As if they had been built so, off and on again; what a program does not know is told."""
+    full, fewer = PRINT.pair(), PRINT.pair(["fresnel", "below-horizon"])
+    chain = [full.mid, full.mvis]
+    (mid, mvis), known = with_effects(chain, {"fresnel": False, "below-horizon": False, "slope": False})
+    assert mid is full.mid
+    assert known == {"fresnel", "below-horizon"}
+    assert mvis.tag_data("M2B0") == fewer.mvis.tag_data("M2B0")
+    assert read_source(mvis) == read_source(fewer.mvis)
+    (again,), _ = with_effects([mvis], {"fresnel": True, "below-horizon": True})
+    assert again.tag_data("M2B0") == full.mvis.tag_data("M2B0")
+    assert gone(again) == ()
+    (same,), _ = with_effects([full.mvis], {"fresnel": True})
+    assert same is full.mvis
+    assert with_effects([replace(PRINT, with_source=False).pair().mvis], {"fresnel": False})[1] == set()
+
+
+def test_a_stale_source_switches_nothing():
+    mvis, other = PRINT.pair().mvis, PRINT.pair(["shadowing"]).mvis
+    stale = mvis.replace(tags={"M2B0": other["M2B0"]})
+    with pytest.raises(ProfileError, match="does not compile to the program of tag M2B0"):
+        with_effects([stale], {"fresnel": False})
 
 
 def test_names_of_values_stand_where_they_are_stored():

@@ -69,10 +69,37 @@ def test_effects_are_left_out(run, tmp_path, image, options, left_out):
     assert not np.allclose(found, expected(), rtol=1e-3)
 
 
+def test_effects_of_programs_are_left_out_by_compiling_their_source_anew(run, tmp_path, image):
+    build = ("build", MVIS.with_name("primaries.json"), "-o", tmp_path, "--without", "fresnel,shadowing")
+    assert run(*build).code == 0
+    result = run("apply", image, *PAIR, "-o", tmp_path / "a.tif", "--without", "fresnel,shadowing", "--json")
+    assert (result.code, result.err) == (0, "")
+    assert result.json["without"] == ["fresnel", "shadowing"]
+    found = tifffile.imread(tmp_path / "a.tif")
+    reduced = ["-p", tmp_path / "mid.icc", "-p", tmp_path / "mvis.icc"]
+    for name, options in (("b.tif", []), ("c.tif", ["--effects", "full", "--without", "fresnel"])):
+        assert run("apply", image, *reduced, "-o", tmp_path / name, *options).code == 0
+        np.testing.assert_array_equal(tifffile.imread(tmp_path / name), found)
+    # And put back.
+    every = "relief,specular,chromatic-specular,fresnel,shadowing"
+    assert run("apply", image, *reduced, "-o", tmp_path / "d.tif", "--effects", every).code == 0
+    np.testing.assert_allclose(tifffile.imread(tmp_path / "d.tif"), expected(), rtol=2e-6)
+    assert not np.allclose(found, expected(), rtol=1e-3)
+
+
+def test_effects_of_programs_without_a_source_are_refused(run, tmp_path, image):
+    build = ("build", MVIS.with_name("primaries.json"), "-o", tmp_path, "--no-source")
+    assert run(*build).code == 0
+    pair = ["-p", tmp_path / "mid.icc", "-p", tmp_path / "mvis.icc"]
+    result = run("apply", image, *pair, "-o", tmp_path / "a.tif", "--without", "fresnel")
+    assert result.code == 2
+    assert "iccbrdf build --without fresnel" in result.err
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--effects", "relief,fresnel"], "iccbrdf build --without fresnel"),
+        (["--without", "slope"], "iccbrdf build --without slope"),
         (["--without", "gloss"], "there is no effect 'gloss'"),
         (["--backend", "nunpy"], "'nunpy' is not one of"),
     ],

@@ -26,7 +26,7 @@ from iccbrdf.build.models import MODELS
 from iccbrdf.build.private_tags import IMAGE_TAG, SLOPES_TAG, image_encoding
 from iccbrdf.build.profiles import decoding, device_channels, ranges, text_tags
 from iccbrdf.build.slope_adjustment import TEMPLATE, check_slopes, slope_constants
-from iccbrdf.build.source import calculator_source, source_tags
+from iccbrdf.build.source import LEFT_OUT, calculator_source, source_tags
 from iccbrdf.calc import Compiled, compile_chain
 from iccbrdf.calc import listing as program_listing
 from iccbrdf.errors import UsageError, nearest
@@ -133,7 +133,7 @@ def build_colour_mid(
         **({"slopes": slope_entries_of(slopes), "slope_method": slope_method} if slopes is not None else {}),
         "interpolation": interpolation,
         **({"p": p, "exponent": exponent} if interpolation == "published" else {}),
-        "without": [name for name in ("slope", "interpolation") if not chosen[name]],
+        LEFT_OUT: [name for name in ("slope", "interpolation") if not chosen[name]],
     }
     if not chosen["slope"]:
         slopes = None

@@ -17,7 +17,7 @@ from iccbrdf.build.effects import EFFECTS, MVIS, chosen_effects
 from iccbrdf.build.listing import listing
 from iccbrdf.build.models import MODELS, Model
 from iccbrdf.build.profiles import Range, decoding, device_channels, ranges, text_tags
-from iccbrdf.build.source import calculator_source, source_tags
+from iccbrdf.build.source import LEFT_OUT, calculator_source, source_tags
 from iccbrdf.build.viewing import Viewing, viewing
 from iccbrdf.calc import Compiled, compile_template
 from iccbrdf.errors import UsageError, nearest
@@ -131,7 +131,7 @@ def build_pair(
             "white": list(primaries.white),
             **({"fresnel_angle": fresnel_angle} if fresnel_angle is not None else {}),
             "variables": dict(variables),
-            "without": [name for name, on in chosen.items() if not on],
+            LEFT_OUT: [name for name, on in chosen.items() if not on],
         }
         mvis = mvis.replace(tags=source_tags(recipe, calculator_source(compiled, PROGRAM_TAG)))
     return Pair(mid, mvis, listing(title, compiled, limits, conditions), compiled, chosen)

@@ -28,14 +28,11 @@ from iccbrdf.brdf.slopes import Slopes
 from iccbrdf.brdf.slopes import read_entries as read_slope_entries
 from iccbrdf.build.bounds import Reflection
 from iccbrdf.build.colour_mid import INTERPOLATIONS, SLOPE_METHODS, ColourMid, build_colour_mid
-from iccbrdf.build.effects import EFFECTS
 from iccbrdf.build.pair import FRESNEL_ANGLES, Pair, build_pair
+from iccbrdf.build.source import LEFT_OUT
 from iccbrdf.errors import InputError, ProfileError, UsageError
 from iccbrdf.icc import Profile
 from iccbrdf.icc.source_tag import SIGNATURE, read_source
-
-LEFT_OUT = "without"
-"""In the recipe of a profile, the effects of its program that it was made without."""
 
 
 @dataclass(frozen=True)
@@ -148,12 +145,6 @@ def recipe_of(profiles: Sequence[Profile]) -> Recipe:
         return _recipe(Record(", ".join(dict.fromkeys(places.values())), f"tag {SIGNATURE}", parts))
     except InputError as error:
         raise ProfileError(str(error)) from None
-
-
-def left_out(profiles: Sequence[Profile]) -> tuple[str, ...]:
-    """The effects that profiles were made without, in the order of `EFFECTS`; unknown ones do not count."""
-    lists = [read_source(profile).recipe.get(LEFT_OUT) for profile in profiles]
-    return tuple(name for name in EFFECTS if any(name in names for names in lists if isinstance(names, list)))
 
 
 def _recipe(record: Record) -> Recipe:

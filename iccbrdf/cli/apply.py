@@ -28,8 +28,9 @@ from iccbrdf.cli.pipeline import (
     run_on_cluster,
 )
 from iccbrdf.cmm import INTENTS, MAX_COST, link
+from iccbrdf.cmm.effects import SUBSTITUTES
 from iccbrdf.errors import UsageError
-from iccbrdf.icc import read_profile
+from iccbrdf.icc import Profile, read_profile
 from iccbrdf.images import ImageSource, Samples, WithNormals, processors
 from iccbrdf.images.blocks import Array
 from iccbrdf.images.checks import NonFinite
@@ -83,7 +84,28 @@ def _effects(effects: str | None, left_out: str | None) -> str | list[str]:
     """What --effects asks for, as `link` takes it."""
     if effects is None:
         return "full" if left_out is None else "auto"
-    return effects if effects in ("auto", "full") else name_list(effects)
+    return effects if effects in ("auto", "full") else _names(effects)
+
+
+def _names(effects: str) -> list[str]:
+    return [name.replace("_", "-") for name in name_list(effects)]
+
+
+def _recompiled(
+    chain: list[Profile], effects: str | list[str], without: list[str]
+) -> tuple[list[Profile], str | list[str], list[str]]:
+    """Profiles whose programs have the effects asked for, and what is left of both lists for `link`."""
+    named = [] if isinstance(effects, str) else effects
+    switches = {**dict.fromkeys(named, True), **dict.fromkeys(without, False)}
+    asked = {name: on for name, on in switches.items() if SUBSTITUTES.get(name, {}) is None}
+    if not asked:
+        return chain, effects, without
+    # The compiler is needed for this alone.
+    from iccbrdf.build.source import with_effects
+
+    chain, known = with_effects(chain, asked)
+    rest = effects if isinstance(effects, str) else [name for name in effects if name not in known]
+    return chain, rest, [name for name in without if name not in known]
 
 
 @click.command("apply", epilog=EPILOG)
@@ -99,7 +121,9 @@ def _effects(effects: str | None, left_out: str | None) -> str | list[str]:
               "call for, with the same result.  full: every pixel runs everything.  Or the names of those to "
               "have of relief, specular, chromatic-specular and chromatic-roughness, separated by commas.  "
               "Default: full, with --without auto.")  # fmt: skip
-@click.option("--without", "left_out", metavar="NAMES", help="Effects to leave out, of these four.")
+@click.option("--without", "left_out", metavar="NAMES",
+              help="Effects to leave out: of these four and, where a profile holds its source, fresnel, "
+              "shadowing, below-horizon and highlight-range, which --effects puts back.")  # fmt: skip
 @backend_option
 @click.option("--intent", type=click.Choice(INTENTS), default="relative", show_default=True)
 @click.option("--samples", type=click.Choice(("device", "real")),
@@ -178,7 +202,8 @@ def command(
     of `iccbrdf build` the BRDF parameters and the normal, for a colour MID XYZ and the normal.  A colour MID
     alone writes the BRDF image, encoded for the binding MID.
     """
-    chain = [read_profile(path) for path in profiles]
+    wanted, gone = _effects(effects, left_out), _names(left_out or "")
+    chain, kept, omitted = _recompiled([read_profile(path) for path in profiles], wanted, gone)
     last = chain[-1]
     to_image = image_link(last) if len(chain) == 1 else None
     if to_image is not None:
@@ -208,8 +233,8 @@ def command(
             "dtype": "float64" if double else "float32",
             "samples": source.samples,
             "backend": backend,
-            "effects": _effects(effects, left_out),
-            "without": name_list(left_out or ""),
+            "effects": kept,
+            "without": omitted,
             "max_cost": max_cost,
         }
         transform = link(chain, **settings)
@@ -240,8 +265,8 @@ def command(
             "env": dict(transform.env),
             "backend": transform.backend,
             "backend_reason": transform.execution.reason,
-            "effects": settings["effects"],
-            "without": settings["without"],
+            "effects": wanted,
+            "without": gone,
             "kinds": dict(done.kinds) if transform.adaptive else {},
             "nonfinite": nonfinite,
             "not_finite_in": done.not_finite_in,

@@ -16,11 +16,13 @@ from iccbrdf.brdf.primaries import read_primaries
 from iccbrdf.brdf.slopes import read_slopes
 from iccbrdf.build import INTERPOLATIONS, SLOPE_METHODS
 from iccbrdf.build.effects import EFFECTS
-from iccbrdf.build.recipe import Recipe, left_out, recipe_of
+from iccbrdf.build.recipe import Recipe, recipe_of
+from iccbrdf.build.source import left_out
 from iccbrdf.build.spans import Directions
 from iccbrdf.cli.options import emit, environment, json_option, name_list, plan_options, scene_options
 from iccbrdf.errors import UsageError
 from iccbrdf.icc import read_profile
+from iccbrdf.icc.source_tag import read_source
 from iccbrdf.images import Samples, open_tiff
 from iccbrdf.planning import Check, Planning, ScenePlan, check_image
 from iccbrdf.scene import LIGHT, VIEW, parse_direction, parse_number
@@ -95,7 +97,7 @@ def command(
         recipe = recipe_of(chain)
     recipe = replace(recipe, variables={**recipe.variables, **environment(light, view, env)})
     plan, check = planned(image, recipe, lights, tolerance, samples, channels)
-    gone = left_out(chain)
+    gone = {name for profile in chain for name in left_out(read_source(profile).recipe)}
     lacking = [finding.effect for finding in plan.findings if finding.called_for and finding.effect in gone]
     result = {
         "image": str(image),
