@@ -168,6 +168,27 @@ def test_observer_of_lights():
     np.testing.assert_allclose(run([profile], LIGHTS), integrated(LIGHTS), rtol=1e-5)
 
 
+MEDIUM = 0.9 * np.linspace(1, 0.8, len(AT))
+NODES = np.array([[0, 0], [0, 1], [1, 0], [0.5, 1]], np.float32)
+
+
+@pytest.mark.parametrize("lab", [0, 2])
+@pytest.mark.parametrize(
+    ("make", "pixels"),
+    [
+        (lambda lab: ReflectanceObserver(RANGE, MEDIUM, lab), REFLECTANCES),
+        (lambda lab: ReflectanceClut(RANGE, MEDIUM, REFLECTANCES[:4].reshape(2, 2, -1), flags=lab), NODES),
+        (lambda lab: EmissionObserver(RANGE, WHITE, lab), LIGHTS),
+        (lambda lab: EmissionClut(RANGE, WHITE, REFLECTANCES[:4].reshape(2, 2, -1), 1, lab), NODES),
+    ],
+    ids=["robs", "rclt", "eobs", "eclt"],
+)
+def test_the_reference_sees_the_same(make, pixels, lab, tmp_path):
+    profile = scanner(make(lab))
+    theirs = reference(tmp_path, [profile], pixels, pcs="Lab " if lab else "XYZ ")
+    np.testing.assert_allclose(run([profile], pixels), theirs, rtol=1e-5, atol=2e-4 if lab else 1e-5)
+
+
 def test_spectral_elements_within_calculators():
     element = EmissionMatrix(RANGE, WHITE, LIGHTS, 0 * WHITE)
     calculator = program("in(0,3) 2 smul(3) elem(0) out(0,3)", 3, 3, (element,)).elements[0]
