@@ -160,7 +160,7 @@ def test_elements_that_contradict(elements, message):
         ("<copyrightTag><textType><TextData>€</TextData></textType></copyrightTag>",
          ProfileError, "expected latin-1 text"),
         ("<redTRCTag><curveType><Curve IdentitySize='99999999'/></curveType></redTRCTag>",
-         ProfileError, "IdentitySize: found 99999999, expected 2 to 65536"),
+         ProfileError, "IdentitySize: found 99999999, expected 1 to 65536"),
         ("<copyrightTag><utf8Type><TextData File='/etc/passwd'/></utf8Type></copyrightTag>",
          ProfileError, "found the file name '/etc/passwd', expected none"),
     ],

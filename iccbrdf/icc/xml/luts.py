@@ -54,9 +54,10 @@ def curve_entries(node: Node, greatest: int) -> list[int]:
     values: list[int] = read_numbers(node, np.uint32, 0).tolist()
     if size is not None and not values:
         count = node.value(U32, size, "IdentitySize")
-        if not 2 <= count <= _MAX_IDENTITY:
-            raise node.error(f"IdentitySize: found {count}, expected 2 to {_MAX_IDENTITY}")
-        values = np.rint(np.linspace(0, greatest, count)).astype(int).tolist()
+        if not 1 <= count <= _MAX_IDENTITY:
+            raise node.error(f"IdentitySize: found {count}, expected 1 to {_MAX_IDENTITY}")
+        # One entry is a gamma, in steps of 1/256.
+        values = [256] if count == 1 else np.rint(np.linspace(0, greatest, count)).astype(int).tolist()
     if values and max(values) > greatest:
         raise node.error(f"found {max(values)}, expected up to {greatest}")
     return values
