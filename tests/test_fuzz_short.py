@@ -5,6 +5,7 @@
 
 import json
 import random
+from importlib.util import find_spec
 
 import pytest
 from fuzz.mutations import mutated
@@ -18,12 +19,15 @@ pytest.importorskip("hypothesis", reason="hypothesis is not installed: pip insta
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-INPUTS = {"profile": 25, "program": 250, "xml": 120, "primaries": 25, "slopes": 300, "table": 150,
-          "tiff": 150, "picture": 150, "job": 300}  # fmt: skip
+INPUTS = {
+    "profile": 10, "program": 120, "xml": 100, "template": 12, "source": 5, "packed": 200, "page": 10,
+    "display": 60, "arguments": 60, "primaries": 40, "slopes": 30, "table": 120, "fit": 20, "tiff": 150,
+    "print": 120, "picture": 120, "exr": 200, "job": 250, "log": 200,
+}  # fmt: skip
 """How many of each kind, so that all together take seconds."""
 
 briefly = settings(
-    max_examples=60,
+    max_examples=40,
     deadline=None,
     derandomize=True,
     database=None,
@@ -31,7 +35,15 @@ briefly = settings(
 )
 
 
-@pytest.mark.parametrize("name", TARGETS)
+HERE = [
+    pytest.param(
+        name, marks=pytest.mark.skipif(name == "exr" and not find_spec("OpenEXR"), reason="no OpenEXR")
+    )
+    for name in TARGETS
+]
+
+
+@pytest.mark.parametrize("name", HERE)
 def test_seeds_are_sound(name):
     """But for one: no profile links that holds a tag of every type."""
     target = TARGETS[name]
@@ -39,9 +51,9 @@ def test_seeds_are_sound(name):
     assert taken.count(False) == (name == "profile")
 
 
-@pytest.mark.parametrize("name", TARGETS)
+@pytest.mark.parametrize("name", HERE)
 def test_mutations_end_in_the_documented_errors(name, tmp_path):
-    target, draw = TARGETS[name], random.Random(7)
+    target, draw = TARGETS[name], random.Random(4)
     pool = target.seeds()
     watch = Watch(name, target, tmp_path)
     for _ in range(INPUTS[name]):
@@ -109,7 +121,7 @@ def paths(value, path=()):
             yield from paths(item, (*path, key))
 
 
-@pytest.mark.parametrize("name", ["primaries", "slopes"])
+@pytest.mark.parametrize("name", ["primaries", "slopes", "log"])
 def test_json_with_anything_anywhere(name):
     documents = [json.loads(data) for data in TARGETS[name].seeds()]
 
@@ -124,7 +136,7 @@ def test_json_with_anything_anywhere(name):
     check()
 
 
-@pytest.mark.parametrize("name", sorted(set(TARGETS) - {"primaries", "profile"}))
+@pytest.mark.parametrize("name", ["program", "xml", "table", "tiff", "job"])
 def test_bytes_of_any_kind(name):
     @briefly
     @given(st.binary(max_size=200))
