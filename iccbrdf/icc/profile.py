@@ -274,7 +274,7 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
 
 
 def read_profile(path: str | os.PathLike[str]) -> Profile:
-    """Read a profile from a file (ICC.2 version 5; also versions 2 and 4, of whose tag types most stay raw).
+    """Read a profile from a file (ICC.2, version 5; also ICC.1, versions 2 and 4).
 
     Raises
     ------

@@ -27,7 +27,8 @@ def to_dict(profile: Profile, *, listing: Listing | None = None, longest: int = 
 
     Arrays and bytes with more than `longest` entries are summarised by shape, extremes and their beginning.
     Programs appear as the lines of `listing`, else as their number of operations.  A tag that cannot
-    be decoded has an `error`, as has a profile inside a tag, of which the first `MAX_PROFILES` are shown.  What no JSON number can be is text: "NaN", "Infinity", "-Infinity".
+    be decoded has an `error`, as has a profile inside a tag, of which the first `MAX_PROFILES` are shown.
+    What no JSON number can be is text: "NaN", "Infinity", "-Infinity".
     """
     return _Plain(listing, longest).profile(profile)
 

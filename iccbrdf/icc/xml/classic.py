@@ -225,10 +225,12 @@ class _NamedColours(Part):
         node.expect(("Name", *space.colour.attributes), ("n", "f"))
         values: Seen = {}
         space.colour.read(node, values)
-        pcs = np.rint((np.array(values["pcs"]) + space.offset) * space.scale)
-        device = np.rint(read_numbers(node, np.float32, 0) * steps)
+        pcs = (np.array(values["pcs"]) + space.offset) * space.scale
+        device = read_numbers(node, np.float32, 0) * steps
         try:
-            return NamedColour(node.get("Name"), tuple(pcs.astype(int)), tuple(device.astype(int)))
+            with np.errstate(invalid="ignore"):  # what is no number becomes one out of range
+                stored = [tuple(np.rint(found).astype(int).tolist()) for found in (pcs, device)]
+            return NamedColour(node.get("Name"), *stored)
         except UsageError as error:
             raise node.error(str(error)) from None
 
