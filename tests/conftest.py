@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from iccbrdf.cli import main
+from iccbrdf.icc import Profile
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
+
+
+def comparable(data: bytes) -> object:
+    """A file; of a profile all that does not hang on the zlib at hand, which packs its source."""
+    if data[36:40] != b"acsp":
+        return data
+    profile = Profile.from_bytes(data)
+    header = replace(profile.header, size=0, profile_id=bytes(16))
+    packed = {"bsrc": profile["bsrc"].text} if "bsrc" in profile else {}
+    return header.to_bytes(), {tag: profile.tag_data(tag) for tag in profile} | packed
 
 
 @pytest.fixture(scope="session")

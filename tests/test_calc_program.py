@@ -8,6 +8,7 @@ from calc_programs import random_program
 from iccbrdf.calc.program import (
     MAX_NESTING,
     Op,
+    Temporary,
     decode_ops,
     encode_ops,
     listing,
@@ -104,6 +105,16 @@ def test_listing_shows_short_numbers_and_no_defaults():
 def test_listing_indents_long_blocks():
     text = "in(0) if { " + "1 2 add tput(3) " * 5 + "} else { 4 } out(0)"
     assert listing(parse(text)) == "in(0) if {\n" + "  1 2 add tput(3)\n" * 5 + "} else { 4 } out(0)\n"
+
+
+def test_a_listing_names_what_is_stored():
+    text = "1 if { 2 tput(3) } else { 4 tsav(0,3) } 5 tput(7) tput(6,2) out(0)"
+    names = (Temporary("a", 0, 2), Temporary("half", 3), Temporary("% odd", 6), Temporary("line\nend", 7))
+    found = listing(parse(text), names)
+    assert found == (
+        "1 if {\n  2 tput(3)  % half\n} else {\n  4 tsav(0,3)  % a\n} 5 tput(7)\ntput(6,2)  % % odd\nout(0)\n"
+    )
+    assert parse(found) == parse(text)
 
 
 def test_comments_blanks_and_names():

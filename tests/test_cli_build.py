@@ -4,6 +4,7 @@ import os
 
 import numpy as np
 import pytest
+from conftest import comparable
 
 import iccbrdf
 from iccbrdf.brdf.geometry import direction
@@ -38,7 +39,8 @@ def test_text_and_files(run, tmp_path):
     assert result.out.startswith("brdf1: 137 operators, at most 135 run for a pixel\n")
     for name in FILES:
         assert str(tmp_path / "new" / "out" / name) in result.out
-        assert (tmp_path / "new" / "out" / name).read_bytes() == (PRIMARIES.parent / name).read_bytes()
+        made, shipped = tmp_path / "new" / "out" / name, PRIMARIES.with_name(name)
+        assert comparable(made.read_bytes()) == comparable(shipped.read_bytes())
 
 
 def test_json(run, tmp_path):
@@ -149,7 +151,8 @@ def test_nothing_is_overwritten_unasked(run, tmp_path, existing):
 
     assert run("build", PRIMARIES, "-o", tmp_path, "--slopes", SLOPES, "--force").code == 0
     assert sorted(os.listdir(tmp_path)) == sorted(FILES)
-    assert (tmp_path / existing).read_bytes() == (PRIMARIES.parent / existing).read_bytes()
+    shipped = PRIMARIES.with_name(existing).read_bytes()
+    assert comparable((tmp_path / existing).read_bytes()) == comparable(shipped)
 
 
 def test_all_files_or_none(run, tmp_path):

@@ -310,6 +310,10 @@ def test_names_come_back():
 def test_programs_are_written_with_the_names_that_the_dialect_takes():
     text = profile_to_xml(with_names(SOURCE)).decode()
     assert 'InputNames="kd_X kd_X_2 _3D" OutputNames="X Y Z a b"' in text
+    comment = text.partition("<!--")[2].partition("-->")[0]
+    assert "table = 1 2.5; 0.1 -1e-30\n" in comment
+    assert "gloss = on\nrelief = off\n" in comment
+    assert "model.calc:\nmodel One\n\ninput kd\n" in comment
     assert '<Declare Name="half" Position="2" Size="3"/>' in text
     assert '<Declare Name="_" Position="0" Size="1"/>' in text
     main = text.partition("<MainFunction>")[2].partition("</MainFunction>")[0].split()
@@ -371,7 +375,7 @@ def test_a_broken_tag_is_a_profile_error(tag):
 @pytest.mark.parametrize("tag", [CompressedUtf8.of("[" * (MAX_TEXT + 1)), Utf8(" " * (MAX_TEXT + 1))])
 def test_a_tag_that_unpacks_to_too_much_is_refused(tag):
     profile = a_profile(A2B0=MultiProcess.of(Calculator(1, 1, parse("1 out(0)"))), bsrc=tag)
-    with pytest.raises(LimitError, match="tag bsrc: .*more than 131072"):
+    with pytest.raises(LimitError, match=r"tag bsrc: .*more than 131072"):
         read_source(profile)
     with pytest.warns(ProfileWarning, match="programs are written without names"):
         profile_to_xml(profile)
