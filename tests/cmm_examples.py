@@ -19,7 +19,7 @@ from iccbrdf.icc import (
 )
 
 TEXTS = {"desc": Mluc.of("An example"), "cprt": Mluc.of("No copyright")}
-WHITE = np.array(D50)
+WHITE = np.round(np.array(D50) * 65536) / 65536  # as a header holds it
 
 
 def matrix(rows, offset=None):

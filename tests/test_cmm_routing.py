@@ -231,16 +231,6 @@ def test_spaces_that_do_not_meet(chain, message):
         iccbrdf.link(chain)
 
 
-@pytest.mark.parametrize("major", [2, 4])
-def test_older_versions_are_not_supported(major):
-    old = device_profile("mntr", B2A0=scaled(1))
-    old = old.replace(
-        header=Header(device_class="mntr", colour_space="RGB ", pcs="XYZ ", version=(major, 0, 0))
-    )
-    with pytest.raises(UnsupportedError, match=f"version {major}; only version 5"):
-        iccbrdf.link([mid("abc"), mvis("abc"), old])
-
-
 def test_files(tmp_path):
     write_profile(mid("ab"), tmp_path / "mid.icc")
     assert iccbrdf.link([str(tmp_path / "mid.icc")])([1, 2]).tolist() == [1, 2]
@@ -287,8 +277,8 @@ def test_a_missing_or_foreign_transform():
         iccbrdf.link([mid("ab", A2M0=Utf8("?"))])
     with pytest.raises(UnsupportedError, match=r"found tag M2S0, which cannot run; expected M2B0\.\.3"):
         iccbrdf.link([mvis("abc", M2S0=scaled(1))])
-    with pytest.raises(UnsupportedError, match="found tag rTRC"):
-        iccbrdf.link([device_profile("mntr", rTRC=Utf8("?"))])
+    with pytest.raises(UnsupportedError, match="found tag bMB0, which cannot run"):
+        iccbrdf.link([mvis("abc", bMB0=Utf8("?"))])
     with pytest.raises(ProfileError, match="A2B0 has 4 channels out, expected 3 by the header"):
         iccbrdf.link([device_profile("scnr", A2B0=matrix(np.ones((4, 3))))])
 

@@ -314,7 +314,7 @@ def evaluate(
     if op == "select":
         return tuple(arguments[1] if arguments[0][0] >= 0.5 else arguments[2])
     row, function = OPERATORS.get(op), meaning(op)
-    if row is None or function is None:
+    if row is None or function is None or row.kind is Kind.MACHINE:
         return None
     planes = [[dtype(value) for value in argument] for argument in arguments]
     with np.errstate(all="ignore"):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from iccbrdf.errors import LinkError, ProfileError
+from iccbrdf.errors import LinkError, ProfileError, ProfileWarning
 from iccbrdf.icc import MultiProcess, Profile, ViewingConditions
 from iccbrdf.icc.header import D50
 
@@ -31,14 +32,20 @@ _STANDARD: tuple[object, ...] = ("D50", "CIE 1931")
 
 
 def conditions(profile: Profile) -> Conditions:
-    """The connection conditions that `profile` states (spectralViewingConditionsTag, else its header)."""
+    """The connection conditions that `profile` states (spectralViewingConditionsTag, else its header).
+
+    Those of versions before 5 are the standard ones.
+    """
     svcn = profile.get("svcn")
+    stated = profile.header.illuminant
+    if profile.header.version[0] < 5:
+        return Conditions(_STANDARD, D50)
     if svcn is None:
-        stated = profile.header.illuminant
-        # All zeros state nothing.
-        if not any(stated) or max(abs(a - b) for a, b in zip(stated, D50, strict=True)) < 5e-4:
+        if not any(stated):  # nothing is stated
             return Conditions(_STANDARD, D50)
         white = _normalised(stated, f"{profile.source}: header: illuminant")
+        if max(abs(a - b) for a, b in zip(stated, D50, strict=True)) < 5e-4:
+            return Conditions(_STANDARD, white)
         return Conditions(("header illuminant", *white), white)
     if not isinstance(svcn, ViewingConditions):
         raise ProfileError(
@@ -82,6 +89,16 @@ def to_standard(profile: Profile) -> list[tuple[str, MultiProcess]]:
 
 def _steps(profile: Profile, tag: str) -> list[tuple[str, MultiProcess]]:
     if conditions(profile).standard:
+        return []
+    if "svcn" not in profile and tag not in profile:
+        # As the reference implementation: conditions are what the tag svcn states.
+        x, y, z = profile.header.illuminant
+        warnings.warn(
+            f"{profile.source}: header: illuminant {x:.5g} {y:.5g} {z:.5g}, but no tag svcn or {tag}; "
+            "its colours are taken for those under D50",
+            ProfileWarning,
+            stacklevel=2,
+        )
         return []
     return [(f"{profile.source}: {tag}", _transform(profile, tag))]
 

@@ -1,26 +1,30 @@
-"""The steps between two profiles of a chain: multiplex routing, connection conditions, media white."""
+"""The steps between two profiles of a chain: multiplex routing, connection conditions, white and black."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from iccbrdf.cmm.conditions import conditions, conversions
 from iccbrdf.cmm.spectral import to_spectra, to_XYZ
 from iccbrdf.cmm.stages import Stage
 from iccbrdf.cmm.steps import LabToXYZ, Process, Route, Scale, Step, XYZToLab
 from iccbrdf.errors import LinkError, ProfileError, nearest
-from iccbrdf.icc import XYZ, NumberArray, Profile
+from iccbrdf.icc import D50, XYZ, Matrix, MultiProcess, NumberArray, Profile
 
+_PERCEPTUAL_BLACK = (0.00336, 0.0034731, 0.00287)
+"""XYZ of the darkest printed black (ICC.1:2010, 6.3.3; the reference medium of the perceptual intent)."""
 _DEFAULT_TYPES = ("ui08", "ui16", "fl16", "fl32", "fl64")
 """Types that a CMM takes multiplex default values in."""
 
 
-def join(before: Stage, after: Stage, *, absolute: bool) -> list[Step]:
+def join(before: Stage, after: Stage) -> list[Step]:
     """The steps from the end of `before` to the start of `after`; LinkError where they do not fit."""
     here, there = before.destination, after.source
     if here.kind == "spectral" and there.kind == "spectral":
         return to_spectra(before, after)
     if here.kind == "spectral" and there.kind == "pcs":
         steps = [*to_XYZ(before), *_connection("XYZ ", before, after)]
-        return [*steps, *media_white(after, absolute, outward=False)]
+        return [*steps, *adjustment(after, outward=False)]
     if here.kind != there.kind:
         raise LinkError(
             f"{before.profile.source} ends on {here.text}, {after.profile.source} starts from {there.text}"
@@ -29,9 +33,9 @@ def join(before: Stage, after: Stage, *, absolute: bool) -> list[Step]:
         return _routing(before, after)
     if here.kind == "pcs":
         return [
-            *media_white(before, absolute, outward=True),
+            *adjustment(before, outward=True),
             *_connection(here.signature, before, after),
-            *media_white(after, absolute, outward=False),
+            *adjustment(after, outward=False),
         ]
     if here.signature != there.signature:
         raise LinkError(
@@ -53,28 +57,42 @@ def _connection(here: str, before: Stage, after: Stage) -> list[Step]:
     return steps
 
 
-def media_white(stage: Stage, absolute: bool, *, outward: bool) -> list[Step]:
-    """The step between the tag's own colorimetry and the one asked for; Lab is scaled by way of XYZ.
-
-    Only the colorimetric tags, ...1 and ...3, relate to the media white.  A ...0 or ...2 that stands in for
-    one of them is used as it is, as the reference implementation does at the end of a chain.
-    """
-    if stage.tag[-1] not in "13" or (stage.tag[-1] == "3") == absolute:
-        return []
+def adjustment(stage: Stage, *, outward: bool) -> list[Step]:
+    """The steps between the tag's own colorimetry and the one asked for; Lab is changed by way of XYZ."""
     space = stage.destination if outward else stage.source
-    white, medium = conditions(stage.profile).white, stage.profile.get("wtpt")
+    if space.kind != "pcs":
+        return []
+    white = conditions(stage.stated).white
+    steps = [*_media_white(stage, white, outward), *_black(stage, outward)]
+    if steps and space.signature == "Lab ":
+        return [LabToXYZ(white), *steps, XYZToLab(white)]
+    return steps
+
+
+def _media_white(stage: Stage, white: tuple[float, float, float], outward: bool) -> list[Step]:
+    absolute = stage.intent == "absolute"
+    if stage.relates is None or (stage.relates == "absolute") == absolute:
+        return []
+    medium = stage.stated.get("wtpt")
     if medium is None:
         return []
     if not isinstance(medium, XYZ) or len(medium.values) != 1 or not min(medium.values[0]) > 0:
-        raise ProfileError(f"{stage.profile.source}: tag wtpt: expected one XYZ number above 0")
+        raise ProfileError(f"{stage.stated.source}: tag wtpt: expected one XYZ number above 0")
     # Relative -> absolute multiplies by wtpt / illuminant; each of the two other switches inverts it once.
     power = (1 if absolute else -1) * (1 if outward else -1)
     factors = tuple(float(m / w) ** power for m, w in zip(medium.values[0], white, strict=True))
-    if max(abs(f - 1) for f in factors) < 2**-16:  # s15Fixed16 tells no more
+    return [] if factors == (1, 1, 1) else [Scale(factors)]
+
+
+def _black(stage: Stage, outward: bool) -> list[Step]:
+    """Between a black of 0 and that of the perceptual intent, the white kept."""
+    if not stage.without_black:
         return []
-    if space.signature == "Lab ":
-        return [LabToXYZ(white), Scale(factors), XYZToLab(white)]
-    return [Scale(factors)]
+    white, black = np.array(D50), np.array(_PERCEPTUAL_BLACK)
+    gain = 1 - black / white
+    line = (gain, black) if outward else (1 / gain, -black / gain)
+    process = MultiProcess.of(Matrix.of(np.diag(line[0]), line[1]))
+    return [Process.checked(process, f"{stage.profile.source}: its black")]
 
 
 def _routing(before: Stage, after: Stage) -> list[Step]:

@@ -18,7 +18,7 @@ from iccbrdf.cmm.arrange import arranged, without_decoding
 from iccbrdf.cmm.effects import Choice, check, choice, substitution
 from iccbrdf.cmm.environment import checked_environment
 from iccbrdf.cmm.execution import BACKENDS
-from iccbrdf.cmm.join import join, media_white
+from iccbrdf.cmm.join import adjustment, join
 from iccbrdf.cmm.resolve import INTERPOLATIONS
 from iccbrdf.cmm.stages import INTENTS, Stage, stages
 from iccbrdf.cmm.steps import Process, Step
@@ -35,22 +35,24 @@ def link(
     env: Mapping[str, float] | None = None,
     backend: str = "auto",
     threads: int = 1,
-    intent: str = "relative",
+    intent: str | Sequence[str] = "relative",
     dtype: npt.DTypeLike = np.float32,
     channels: Sequence[str] | None = None,
     samples: str = "device",
     interpolation: str = "multilinear",
     spectral: bool = True,
+    conditions: Mapping[int, str | os.PathLike[str] | Profile] | None = None,
     effects: str | Collection[str] = "full",
     without: Collection[str] = (),
     max_cost: float = MAX_COST,
 ) -> Transform:
-    """Link v5 profiles, paths or objects, into one transform.
+    """Link profiles, paths or objects, into one transform.
 
     Parameters
     ----------
     profiles
-        The chain, in order: a MID and an MVIS, either of them alone, or any chain whose spaces meet.
+        The chain, in order: a MID and an MVIS, either of them alone, or any chain whose spaces meet, of
+        versions 2, 4 and 5.
     env
         Run-time variables by name; those not given take the defaults that the programs hold.
     backend
@@ -59,7 +61,7 @@ def link(
     threads
         Tiles that run at a time.
     intent
-        `perceptual`, `relative`, `saturation` or `absolute`.
+        `perceptual`, `relative`, `saturation` or `absolute`; or one of them for each profile.
     dtype
         float32, as a CMM computes, or float64.
     channels
@@ -76,6 +78,9 @@ def link(
     spectral
         Whether profiles that have both take spectra rather than colours to their neighbours, as ICC's own CMM
         does; the results of a last one are spectra then.
+    conditions
+        By position in the chain, from 0: a profile whose viewing conditions (with its conversions to and from
+        D50, and its media white) stand in for those of the profile there.
     effects
         `full`: every pixel runs the whole chain.  `auto`: tiles that have little in them, such as flat or
         matte ones, run only what they call for.  The numbers are the same but for the sign of zeros, or
@@ -115,9 +120,13 @@ def link(
     chain = [p if isinstance(p, Profile) else read_profile(p) for p in profiles]
     if not chain:
         raise UsageError("no profile to link")
+    several = isinstance(intent, Sequence) and not isinstance(intent, str)
+    intents: list[str] = list(intent) if several else [intent] * len(chain)  # type: ignore[list-item]
+    if len(intents) != len(chain):
+        raise UsageError(f"intent: found {len(intents)}, expected one, or {len(chain)} for as many profiles")
     for value, valid, what in (
         (backend, BACKENDS, "backend"),
-        (intent, INTENTS, "intent"),
+        *((name, INTENTS, "intent") for name in intents),
         (samples, ("device", "real"), "samples"),
         (interpolation, INTERPOLATIONS, "interpolation"),
     ):
@@ -128,23 +137,19 @@ def link(
     chosen = choice(effects, without)
     number_type = _number_type(dtype)
 
-    absolute = intent == "absolute"
-    first, *others = stages(chain, intent, spectral=spectral)
+    first, *others = stages(chain, intents, spectral=spectral, stated=_stated(conditions, len(chain)))
     if samples == "real":
         first = without_decoding(first)
     steps: list[Step] = []
     if channels is not None:
         steps, first = arranged(first, tuple(channels))
     check(chosen, [stage.source.names for stage in (first, *others) if stage.source.kind == "mcs"])
-    if first.source.kind == "pcs":
-        steps += media_white(first, absolute, outward=False)
-    steps += [*_without(chosen, first), first.step(interpolation)]
+    steps += [*adjustment(first, outward=False), *_without(chosen, first), first.step(interpolation)]
     for before, after in pairwise([first, *others]):
-        steps += join(before, after, absolute=absolute)
+        steps += join(before, after)
         steps += [*_without(chosen, after), after.step(interpolation)]
     last = others[-1] if others else first
-    if last.destination.kind == "pcs":
-        steps += media_white(last, absolute, outward=True)
+    steps += adjustment(last, outward=True)
 
     variables = tuple(dict.fromkeys(v for step in steps if isinstance(step, Process) for v in step.variables))
     transform = Transform(
@@ -170,6 +175,18 @@ def _without(chosen: Choice, stage: Stage) -> list[Step]:
     """What leaves out effects of the channels that a stage starts from."""
     step = substitution(stage.source.names, chosen.left_out) if stage.source.kind == "mcs" else None
     return [] if step is None else [step]
+
+
+def _stated(
+    conditions: Mapping[int, str | os.PathLike[str] | Profile] | None, count: int
+) -> dict[int, Profile]:
+    for position in conditions or ():
+        if position not in range(count):
+            raise UsageError(f"conditions: found position {position!r}, expected 0 to {count - 1}")
+    return {
+        position: profile if isinstance(profile, Profile) else read_profile(profile)
+        for position, profile in (conditions or {}).items()
+    }
 
 
 def _number_type(dtype: npt.DTypeLike) -> type[np.floating[Any]]:

@@ -6,6 +6,7 @@ Every stage of such a table takes and gives 0..1, to which it clips; connection 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -50,7 +51,7 @@ def as_elements(lut: Lut, source: Space, destination: Space, place: str) -> Mult
     elements = [
         *_encoded(source, legacy),
         *_stages(lut, source, place),
-        *_clipped(lut.outputs),
+        *clipped(lut.outputs),
         *_decoded(destination, legacy),
     ]
     return MultiProcess(lut.inputs, lut.outputs, tuple(elements))
@@ -60,27 +61,28 @@ def _stages(lut: Lut, source: Space, place: str) -> list[Any]:
     if isinstance(lut, (Lut8, Lut16)):
         matrix = np.reshape(lut.matrix, (3, 3))
         return [
-            *([Matrix.of(matrix), *_clipped(3)] if source.signature == "XYZ " else []),
+            *([Matrix.of(matrix), *clipped(3)] if source.signature == "XYZ " else []),
             CurveSet(tuple(SampledCurve(0, 1, 0, row) for row in lut.input_tables)),
             ExtendedClut(lut.table, 0),
             CurveSet(tuple(SampledCurve(0, 1, 0, row) for row in lut.output_tables)),
         ]
     matrix_stage = []
     if lut.matrix is not None:
-        matrix_stage = [Matrix.of(np.reshape(lut.matrix[:9], (3, 3)), lut.matrix[9:]), *_clipped(3)]
+        matrix_stage = [Matrix.of(np.reshape(lut.matrix[:9], (3, 3)), lut.matrix[9:]), *clipped(3)]
     stages = [
-        _curves(lut.b_curves, f"{place}: B curve"),
+        curve_elements(lut.b_curves, f"{place}: B curve"),
         matrix_stage,
-        _curves(lut.m_curves, f"{place}: M curve"),
+        curve_elements(lut.m_curves, f"{place}: M curve"),
         [lut.clut] if lut.clut is not None else [],
-        _curves(lut.a_curves, f"{place}: A curve"),
+        curve_elements(lut.a_curves, f"{place}: A curve"),
     ]
     if isinstance(lut, LutAToB):
         stages.reverse()
     return [element for stage in stages for element in stage]
 
 
-def _clipped(channels: int) -> list[Any]:
+def clipped(channels: int) -> list[Any]:
+    """What keeps channels in 0..1."""
     return [CurveSet((_IDENTITY,) * channels)]
 
 
@@ -105,26 +107,31 @@ def _decoded(space: Space, legacy: bool) -> list[Any]:
     return [] if encoding is None else [Matrix.of(np.diag(encoding[0]), encoding[1])]
 
 
-def _curves(curves: tuple[Curve | ParametricCurve, ...] | None, place: str) -> list[Any]:
+def curve_elements(
+    curves: Sequence[Curve | ParametricCurve | SegmentedCurve] | None, place: str
+) -> list[Any]:
+    """Curves for channels in 0..1; nothing where there are none."""
     if curves is None:
         return []
     made = CurveSet(tuple(_curve(curve, f"{place} {i}") for i, curve in enumerate(curves)))
     # Samples end at 0 and 1, formulas go on.
     formulas = any(isinstance(curve, SegmentedCurve) for curve in made.curves)
-    return [*(_clipped(len(curves)) if formulas else []), made]
+    return [*(clipped(len(curves)) if formulas else []), made]
 
 
-def _curve(curve: Curve | ParametricCurve, place: str) -> SampledCurve | SegmentedCurve:
+def _curve(curve: Curve | ParametricCurve | SegmentedCurve, place: str) -> SampledCurve | SegmentedCurve:
+    if isinstance(curve, SegmentedCurve):
+        return curve
     if isinstance(curve, ParametricCurve):
         return _parametric(curve, place)
     if not curve.entries:
         return _IDENTITY
     if len(curve.entries) == 1:
-        return SegmentedCurve((), (_power(curve.entries[0] / 256),))
+        return SegmentedCurve((), (power(curve.entries[0] / 256),))
     return SampledCurve(0, 1, 0, np.array(curve.entries) / 65535)
 
 
-def _power(g: float, a: float = 1.0, b: float = 0.0, c: float = 0.0) -> FormulaSegment:
+def power(g: float, a: float = 1.0, b: float = 0.0, c: float = 0.0) -> FormulaSegment:
     """(a x + b)^g + c."""
     return FormulaSegment(0, (g, a, b, c))
 
@@ -133,12 +140,12 @@ def _parametric(curve: ParametricCurve, place: str) -> SegmentedCurve:
     """Two segments; the point between them belongs to the upper one, so the break lies just before it."""
     g, a, b, c, d, e, f = (*curve.parameters, *(0.0,) * (7 - len(curve.parameters)))
     if curve.type == 0:
-        return SegmentedCurve((), (_power(g),))
+        return SegmentedCurve((), (power(g),))
     if curve.type < 3:
         if not a > 0:
             raise ProfileError(f"{place}: parameter a: found {a:g}, expected above 0")
-        at, lower, offset = -b / a, _power(1, 0, 0, c), c
+        at, lower, offset = -b / a, power(1, 0, 0, c), c
     else:
-        at, lower, offset = d, _power(1, c, 0, f), e
+        at, lower, offset = d, power(1, c, 0, f), e
     point = float(np.nextafter(np.float32(at), np.float32(-np.inf)))
-    return SegmentedCurve((point,), (lower, _power(g, a, b, offset)))
+    return SegmentedCurve((point,), (lower, power(g, a, b, offset)))

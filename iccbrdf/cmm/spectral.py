@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from iccbrdf.cmm.conditions import conditions
 from iccbrdf.cmm.observer import Wavelengths, folded, observer, wavelengths
 from iccbrdf.cmm.stages import Stage
 from iccbrdf.cmm.steps import Process, Step
-from iccbrdf.errors import LimitError, LinkError
+from iccbrdf.errors import LimitError, LinkError, ProfileError
 from iccbrdf.icc import Matrix, MultiProcess, Profile
 
 MAX_FACTORS = 1 << 22
@@ -18,11 +19,22 @@ _REFLECTED, _EMITTED = ("rs", "ts"), "es"
 
 
 def to_XYZ(stage: Stage) -> list[Step]:
-    """From the spectra that `stage` ends on to XYZ under the viewing conditions of its profile."""
+    """From the spectra that `stage` ends on to XYZ under the viewing conditions of its profile.
+
+    The perfect diffuser has the XYZ that the conditions state for the illuminant, which may be rounded.
+    """
     kind = _kind(stage)
     at = _wavelengths(stage.profile)
     seen_by = observer(stage.viewing)
-    return [_matrix(seen_by.radiance(at) if kind == _EMITTED else seen_by.reflectance(at), stage)]
+    if kind == _EMITTED:
+        return [_matrix(seen_by.radiance(at), stage)]
+    matrix = seen_by.reflectance(at)
+    computed = matrix.sum(axis=1)
+    if not (computed > 0).all():
+        raise ProfileError(
+            f"{stage.viewing.source}: tag svcn: light of XYZ {computed}, expected numbers above 0"
+        )
+    return [_matrix(matrix * (conditions(stage.viewing).white / computed)[:, None], stage)]
 
 
 def to_spectra(before: Stage, after: Stage) -> list[Step]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from iccbrdf.cmm.luts import TYPES, as_elements
 from iccbrdf.cmm.resolve import Resolver, holds_spectra
+from iccbrdf.cmm.shapers import SHAPERS, shaper
 from iccbrdf.cmm.spaces import Space, device_space, mcs_space, pcs_space, spectral_space
 from iccbrdf.cmm.steps import Process
 from iccbrdf.errors import ProfileError, ProfileWarning, UnsupportedError, nearest
@@ -23,8 +25,9 @@ _BY_THE_BOOK = {0: (0,), 1: (1, 3, 0), 2: (2, 0), 3: (3, 1, 0)}
 
 _NO_PIXELS = {"nmcl": "named colours", "cenc": "a colour encoding"}
 
-_CANNOT_RUN = ("M2S", "D2B", "B2D", "rTRC", "kTRC")
-"""Tags that may hold a profile's only transform, where it is for spectra or no processing elements."""
+_CANNOT_RUN = ("M2S", "D2B", "B2D", *(f"{kind}{way}" for kind in "bd" for way in ("AB", "BA", "DB", "BD")),
+               "bMB", "bMS", "bcp", "bsp")  # fmt: skip
+"""Tags that may hold a profile's only transform: for spectra, or for directions as further channels."""
 
 
 @dataclass(frozen=True)
@@ -32,12 +35,15 @@ class Stage:
     """One profile's part in the chain."""
 
     profile: Profile
+    intent: str
     tag: str
     process: MultiProcess
     source: Space
     destination: Space
+    stated: Profile
+    """Whose viewing conditions and media white hold: its own, unless the caller names another profile."""
     viewing: Profile
-    """Whose viewing conditions the connection space is under, and spectra are seen under.
+    """Whose viewing conditions the connection space is under, and spectra are seen under: those stated.
 
     Spectra before spectral elements bind these late: both profiles of such a pair are seen under the first
     one's conditions, and nothing is converted between them.
@@ -49,6 +55,29 @@ class Stage:
         return f"{self.profile.source}: tag {self.tag}"
 
     @property
+    def relates(self) -> Literal["relative", "absolute"] | None:
+        """Whether the tag's colours are relative to the media white; None where that is not told.
+
+        Only the colorimetric tags, ...1 and ...3, tell.  A ...0 or ...2 that stands in for one of them is
+        used as it is, as the reference implementation does at the end of a chain; but before version 5, what
+        is not absolute is relative.
+        """
+        if self.tag[-1] == "3":
+            return "absolute"
+        classic = self.profile.header.version[0] < 5 or self.tag in SHAPERS
+        return "relative" if classic or self.tag[-1] == "1" else None
+
+    @property
+    def without_black(self) -> bool:
+        """Whether the black of the perceptual intent is 0, and not what version 4 has agreed on."""
+        header = self.profile.header
+        return (
+            self.intent == "perceptual"
+            and header.device_class != "abst"
+            and (header.version[0] < 4 or self.tag in SHAPERS)
+        )
+
+    @property
     def is_spectral(self) -> bool:
         """Whether the tag has elements that viewing conditions turn into others."""
         return any(map(holds_spectra, self.process.elements))
@@ -58,16 +87,29 @@ class Stage:
         return Process.checked(self.process, self.where, Resolver(self.viewing, interpolation))
 
 
-def stages(chain: Sequence[Profile], intent: str, *, spectral: bool = True) -> list[Stage]:
+def stages(
+    chain: Sequence[Profile],
+    intent: str | Sequence[str],
+    *,
+    spectral: bool = True,
+    stated: Mapping[int, Profile] | None = None,
+) -> list[Stage]:
     """The stages of a chain of profiles; which tag runs depends on the intent and on the neighbours.
 
-    spectral: whether transforms to a spectral connection space go before those to a colorimetric one.
+    intent: one for all, or one a profile.  spectral: whether transforms to a spectral connection space go
+    before those to a colorimetric one.  stated: by position in the chain, profiles whose viewing conditions
+    stand in for those of the profile there.
     """
+    intents = [intent] * len(chain) if isinstance(intent, str) else intent
     found: list[Stage] = []
     for i, profile in enumerate(chain):
+        if found and not profile.header.extended_range:
+            found += _to_usual_range(found[-1])
         source = found[-1].destination if found else None
         following = chain[i + 1].header.device_class if i + 1 < len(chain) else ""
-        stage = _stage(profile, source, following, INTENTS.index(intent), spectral)
+        stage = _stage(profile, source, following, intents[i], spectral)
+        if stated and i in stated:
+            stage = replace(stage, stated=stated[i], viewing=stated[i])
         if found and source is not None and stage.is_spectral:
             before = found[-1]
             if source.kind == "spectral" or (source.kind == "pcs" and before.is_spectral):
@@ -76,13 +118,9 @@ def stages(chain: Sequence[Profile], intent: str, *, spectral: bool = True) -> l
     return found
 
 
-def _stage(profile: Profile, before: Space | None, following: str, intent: int, spectral: bool) -> Stage:
+def _stage(profile: Profile, before: Space | None, following: str, asked: str, spectral: bool) -> Stage:
     """The transform that `profile` contributes between the space before it and the profile after it."""
-    device_class = profile.header.device_class
-    if profile.header.version[0] < 5:
-        raise UnsupportedError(
-            f"{profile.source}: version {profile.header.version[0]}; only version 5 profiles link here"
-        )
+    device_class, intent = profile.header.device_class, INTENTS.index(asked)
     if device_class in _NO_PIXELS:
         raise UnsupportedError(
             f"{profile.source}: class {device_class!r}, {_NO_PIXELS[device_class]}, "
@@ -109,13 +147,19 @@ def _stage(profile: Profile, before: Space | None, following: str, intent: int, 
         tag, destination = _connection(profile, "D2B", ("D2B", "A2B"), intent, spectral)
         source = device_space(profile)
     process = _multi_process(profile, tag, source, destination)
-    for side, space, found in (("in", source, process.inputs), ("out", destination, process.outputs)):
-        if found != len(space.names):
-            raise ProfileError(
-                f"{profile.source}: tag {tag} has {found} channels {side}, "
-                f"expected {len(space.names)} by the header ({space.text})"
-            )
-    return Stage(profile, tag, process, source, destination, profile)
+    return Stage(profile, asked, tag, process, source, destination, profile, profile)
+
+
+def _to_usual_range(stage: Stage) -> list[Stage]:
+    """What brings colours of an extended range to the usual one, where the stage's profile has such a tag."""
+    profile, space = stage.profile, stage.destination
+    if not profile.header.extended_range or space.kind != "pcs":
+        return []
+    for tag in dict.fromkeys((f"H2S{INTENTS.index(stage.intent)}", "H2S0", "H2S1")):
+        if tag in profile:
+            process = _multi_process(profile, tag, space, space)
+            return [replace(stage, tag=tag, process=process, source=space)]
+    return []
 
 
 def _connection(
@@ -146,6 +190,9 @@ def _by_intent(profile: Profile, families: tuple[str, ...], intent: int) -> str:
                     stacklevel=6,
                 )
             return tag
+    for tag in SHAPERS:
+        if tag in profile:
+            return tag
     wanted = " or ".join(f"{family}0..3" for family in families)
     for tag in profile:
         if tag.startswith(_CANNOT_RUN):
@@ -154,14 +201,24 @@ def _by_intent(profile: Profile, families: tuple[str, ...], intent: int) -> str:
 
 
 def _multi_process(profile: Profile, tag: str, source: Space, destination: Space) -> MultiProcess:
+    if tag in SHAPERS:
+        return shaper(profile, tag, source, destination)
     value = profile.get(tag)
     if value is None:
         raise ProfileError(f"{profile.source}: tag {tag} is missing: {nearest(tag, profile)}")
     if isinstance(value, TYPES):
-        return as_elements(value, source, destination, f"{profile.source}: tag {tag}")
-    if not isinstance(value, MultiProcess):
+        process = as_elements(value, source, destination, f"{profile.source}: tag {tag}")
+    elif isinstance(value, MultiProcess):
+        process = value
+    else:
         raise UnsupportedError(
             f"{profile.source}: tag {tag} is of type {value.signature!r}; "
             "only processing elements and look-up tables can run"
         )
-    return value
+    for side, space, found in (("in", source, process.inputs), ("out", destination, process.outputs)):
+        if found != len(space.names):
+            raise ProfileError(
+                f"{profile.source}: tag {tag} has {found} channels {side}, "
+                f"expected {len(space.names)} by the header ({space.text})"
+            )
+    return process

@@ -177,7 +177,7 @@ class XYZToLab:
 
 @dataclass(frozen=True)
 class LabToXYZ:
-    """CIELAB relative to `white` -> XYZ (Y = 1 for the white)."""
+    """CIELAB relative to `white` -> XYZ (Y = 1 for the white), 0 where no light is that dark or colourful."""
 
     white: tuple[float, float, float]
 
@@ -185,10 +185,12 @@ class LabToXYZ:
         lightness, a, b = (np.asarray(c, dtype) for c in channels)
         y = (lightness + dtype(16)) / dtype(116)
         roots = (y + a / dtype(500), y, y - b / dtype(200))
-        return [
-            dtype(w) * np.where(f > 6 / 29, f * f * f, (f - dtype(4 / 29)) / dtype(_SLOPE))
-            for f, w in zip(roots, self.white, strict=True)
-        ]
+
+        def inverse(f: Channel, white: float) -> Channel:
+            dark = np.where(f < 4 / 29, dtype(0), (f - dtype(4 / 29)) / dtype(_SLOPE))
+            return dtype(white) * np.where(f > 6 / 29, f * f * f, dark)
+
+        return [inverse(f, white) for f, white in zip(roots, self.white, strict=True)]
 
     def lift(self, graph: Graph, channels: Sequence[Node], *, finite_inputs: bool) -> list[Node]:
         op, number = graph.apply, graph.number
@@ -198,7 +200,8 @@ class LabToXYZ:
         def inverse(f: Node, white: float) -> Node:
             cube = op("mul", op("mul", f, f), f)
             line = op("div", op("sub", f, number(4 / 29)), number(_SLOPE))
-            ratio = op("select", op("gt", f, number(6 / 29)), cube, line)
+            dark = op("select", op("lt", f, number(4 / 29)), number(0), line)
+            ratio = op("select", op("gt", f, number(6 / 29)), cube, dark)
             return op("mul", number(white), ratio)
 
         x = op("add", y, op("div", a, number(500)))

@@ -35,7 +35,7 @@ from iccbrdf.icc.elements import (
     UnknownElement,
 )
 from iccbrdf.icc.gamut import GamutBoundary
-from iccbrdf.icc.header import D50, MCS_SUBSET, Header, channel_count
+from iccbrdf.icc.header import D50, EXTENDED_RANGE, MCS_SUBSET, Header, channel_count
 from iccbrdf.icc.lut import Curve, LutAToB, LutBToA, ParametricCurve
 from iccbrdf.icc.lut_tables import Lut8, Lut16
 from iccbrdf.icc.packed import CompressedUtf8, CompressedXml, HeightImage, NormalImage, VendorXml
@@ -100,6 +100,7 @@ __all__ = [
     "CURVES",
     "D50",
     "ELEMENTS",
+    "EXTENDED_RANGE",
     "MCS_SUBSET",
     "SEGMENTS",
     "TAGS",

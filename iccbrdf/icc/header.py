@@ -15,6 +15,8 @@ D50 = (0.9642, 1.0, 0.8249)
 """XYZ of the connection space's illuminant, Y = 1."""
 MCS_SUBSET = 1 << 2
 """Flag: a profile that this one is linked with must have all the MCS channels of this one."""
+EXTENDED_RANGE = 1 << 3
+"""Flag: connection space values go beyond the usual range; the tags H2S0..3 take them to it."""
 
 _COUNTED = re.compile(r"(nc|mc|rs|ts|es|bs|sm)[0-9a-f]{4}")
 _CHANNELS = {
@@ -125,6 +127,11 @@ class Header(Record):
     def mcs_subset(self) -> bool:
         """Whether the other profile of a link must have all the MCS channels of this one."""
         return bool(self.flags & MCS_SUBSET)
+
+    @property
+    def extended_range(self) -> bool:
+        """Whether connection space values go beyond the usual range."""
+        return bool(self.flags & EXTENDED_RANGE)
 
 
 def channel_count(space: str) -> int | None:
