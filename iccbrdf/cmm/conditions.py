@@ -65,6 +65,11 @@ def conditions(profile: Profile) -> Conditions:
     return Conditions((*observer, *illuminant), white)
 
 
+def equal_in_file(a: Iterable[float], b: Iterable[float]) -> bool:
+    """Whether the numbers are the same as s15Fixed16."""
+    return all(round(p * 65536) == round(q * 65536) for p, q in zip(a, b, strict=True))
+
+
 def _normalised(XYZ: Iterable[float], place: str) -> tuple[float, float, float]:
     x, y, z = XYZ
     if not all(math.isfinite(v) and v > 0 for v in (x, y, z)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from iccbrdf.cmm.conditions import conditions, conversions
+from iccbrdf.cmm.conditions import conditions, conversions, equal_in_file
 from iccbrdf.cmm.spectral import to_spectra, to_XYZ
 from iccbrdf.cmm.stages import Stage
 from iccbrdf.cmm.steps import LabToXYZ, Process, Route, Scale, Step, XYZToLab
@@ -23,8 +23,7 @@ def join(before: Stage, after: Stage) -> list[Step]:
     if here.kind == "spectral" and there.kind == "spectral":
         return to_spectra(before, after)
     if here.kind == "spectral" and there.kind == "pcs":
-        steps = [*to_XYZ(before), *_connection("XYZ ", before, after)]
-        return [*steps, *adjustment(after, outward=False)]
+        return [*to_XYZ(before), *_connection("XYZ ", before, after)]
     if here.kind != there.kind:
         raise LinkError(
             f"{before.profile.source} ends on {here.text}, {after.profile.source} starts from {there.text}"
@@ -32,11 +31,7 @@ def join(before: Stage, after: Stage) -> list[Step]:
     if here.kind == "mcs":
         return _routing(before, after)
     if here.kind == "pcs":
-        return [
-            *adjustment(before, outward=True),
-            *_connection(here.signature, before, after),
-            *adjustment(after, outward=False),
-        ]
+        return _connection(here.signature, before, after)
     if here.signature != there.signature:
         raise LinkError(
             f"{before.profile.source} gives {here.text}, but {after.profile.source} takes {there.text}"
@@ -45,9 +40,13 @@ def join(before: Stage, after: Stage) -> list[Step]:
 
 
 def _connection(here: str, before: Stage, after: Stage) -> list[Step]:
-    """From the connection space `here` to that of `after`; a change of conditions is done on XYZ."""
+    """From the connection space `here` to that of `after`; every change is done on XYZ."""
     there = after.source.signature
-    steps: list[Step] = [Process.checked(p, place) for place, p in conversions(before.viewing, after.viewing)]
+    steps: list[Step] = [
+        *_adjusted(before, outward=True),
+        *(Process.checked(process, place) for place, process in conversions(before.viewing, after.viewing)),
+        *_adjusted(after, outward=False),
+    ]
     if here == there and not steps:
         return []
     if here == "Lab ":
@@ -57,19 +56,23 @@ def _connection(here: str, before: Stage, after: Stage) -> list[Step]:
     return steps
 
 
-def adjustment(stage: Stage, *, outward: bool) -> list[Step]:
-    """The steps between the tag's own colorimetry and the one asked for; Lab is changed by way of XYZ."""
+def at_the_end(stage: Stage, *, outward: bool) -> list[Step]:
+    """At an end of the chain: the steps between the tag's own colorimetry and the one asked for."""
     space = stage.destination if outward else stage.source
-    if space.kind != "pcs":
-        return []
-    white = conditions(stage.stated).white
-    steps = [*_media_white(stage, white, outward), *_black(stage, outward)]
+    steps = _adjusted(stage, outward=outward)
     if steps and space.signature == "Lab ":
+        white = conditions(stage.viewing).white
         return [LabToXYZ(white), *steps, XYZToLab(white)]
     return steps
 
 
-def _media_white(stage: Stage, white: tuple[float, float, float], outward: bool) -> list[Step]:
+def _adjusted(stage: Stage, *, outward: bool) -> list[Step]:
+    """Between XYZ as the tag has it and XYZ of the intent that is asked for."""
+    space = stage.destination if outward else stage.source
+    return [*_media_white(stage, outward), *_black(stage, outward)] if space.kind == "pcs" else []
+
+
+def _media_white(stage: Stage, outward: bool) -> list[Step]:
     absolute = stage.intent == "absolute"
     if stage.relates is None or (stage.relates == "absolute") == absolute:
         return []
@@ -78,10 +81,12 @@ def _media_white(stage: Stage, white: tuple[float, float, float], outward: bool)
         return []
     if not isinstance(medium, XYZ) or len(medium.values) != 1 or not min(medium.values[0]) > 0:
         raise ProfileError(f"{stage.stated.source}: tag wtpt: expected one XYZ number above 0")
+    white = conditions(stage.stated).white
+    if equal_in_file(medium.values[0], white):
+        return []
     # Relative -> absolute multiplies by wtpt / illuminant; each of the two other switches inverts it once.
     power = (1 if absolute else -1) * (1 if outward else -1)
-    factors = tuple(float(m / w) ** power for m, w in zip(medium.values[0], white, strict=True))
-    return [] if factors == (1, 1, 1) else [Scale(factors)]
+    return [Scale(tuple(float(m / w) ** power for m, w in zip(medium.values[0], white, strict=True)))]
 
 
 def _black(stage: Stage, outward: bool) -> list[Step]:

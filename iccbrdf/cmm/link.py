@@ -18,7 +18,7 @@ from iccbrdf.cmm.arrange import arranged, without_decoding
 from iccbrdf.cmm.effects import Choice, check, choice, substitution
 from iccbrdf.cmm.environment import checked_environment
 from iccbrdf.cmm.execution import BACKENDS
-from iccbrdf.cmm.join import adjustment, join
+from iccbrdf.cmm.join import at_the_end, join
 from iccbrdf.cmm.resolve import INTERPOLATIONS
 from iccbrdf.cmm.stages import INTENTS, Stage, stages
 from iccbrdf.cmm.steps import Process, Step
@@ -144,12 +144,12 @@ def link(
     if channels is not None:
         steps, first = arranged(first, tuple(channels))
     check(chosen, [stage.source.names for stage in (first, *others) if stage.source.kind == "mcs"])
-    steps += [*adjustment(first, outward=False), *_without(chosen, first), first.step(interpolation)]
+    steps += [*at_the_end(first, outward=False), *_without(chosen, first), first.step(interpolation)]
     for before, after in pairwise([first, *others]):
         steps += join(before, after)
         steps += [*_without(chosen, after), after.step(interpolation)]
     last = others[-1] if others else first
-    steps += adjustment(last, outward=True)
+    steps += at_the_end(last, outward=True)
 
     variables = tuple(dict.fromkeys(v for step in steps if isinstance(step, Process) for v in step.variables))
     transform = Transform(

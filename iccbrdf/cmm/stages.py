@@ -60,8 +60,10 @@ class Stage:
 
         Only the colorimetric tags, ...1 and ...3, tell.  A ...0 or ...2 that stands in for one of them is
         used as it is, as the reference implementation does at the end of a chain; but before version 5, what
-        is not absolute is relative.
+        is not absolute is relative.  Tags between two ranges take colours of either kind.
         """
+        if self.tag.startswith("H2S"):
+            return None
         if self.tag[-1] == "3":
             return "absolute"
         classic = self.profile.header.version[0] < 5 or self.tag in SHAPERS
