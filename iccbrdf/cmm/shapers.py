@@ -134,8 +134,8 @@ def _inverse_samples(entries: tuple[int, ...], place: str) -> SampledCurve:
     values, positions = np.array(entries), np.linspace(0, 1, len(entries))
     if values[0] > values[-1]:
         values, positions = values[::-1], positions[::-1]
-    # A curve that turns back is flat there, and the first place on a flat piece is taken.
-    values, first = np.unique(np.maximum.accumulate(values), return_index=True)
-    if len(values) < 2:
+    values = np.maximum.accumulate(values)  # flat where the curve turns back
+    if values[0] == values[-1]:
         raise ProfileError(f"{place}: found a flat curve, which has no inverse")
-    return SampledCurve(0, 1, 0, np.interp(np.arange(_STEPS + 1), values, positions[first]))
+    # On a flat piece np.interp takes the last place.
+    return SampledCurve(0, 1, 0, np.interp(np.arange(_STEPS + 1), values, positions))
