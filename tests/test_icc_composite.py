@@ -190,6 +190,7 @@ def test_table_of_8_bits_and_bytes_after_it():
         (lambda: HeightImage(0, 2, 0, 1, b""), "format: found 2, expected 0 to 1"),
         (lambda: GamutBoundary([[0, 0]], [[0]], [[0]]), r"expected \(count, 3\)"),
         (lambda: GamutBoundary([[0, 0, 0]], [[0]], [[0], [1]]), "as many in both"),
+        (lambda: GamutBoundary([[0, 0, 0]], [[]], [[0]]), "pcs: found no channels"),
         (lambda: Lut16([[0, 1]], [[0, 1]], [[0, 1]]), "2 to 255 grid points"),
         (lambda: Lut16([[0, 1]], [[0], [1]], [[0]]), "output_tables: found shape"),
         (lambda: Lut8([[0, 1]], [[0], [1]], [[0, 1]]), "expected 1 rows of 256"),

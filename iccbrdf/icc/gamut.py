@@ -45,5 +45,7 @@ class GamutBoundary(Record):
                 f"found vertices of shape {self.pcs.shape} and {self.device.shape}, "
                 "expected rows of channels, as many in both"
             )
+        if not self.pcs.shape[1]:
+            raise ValueError("pcs: found no channels, expected one or more")
         if self.triangles.ndim != 2 or self.triangles.shape[1] != 3:
             raise ValueError(f"triangles: found shape {self.triangles.shape}, expected (count, 3)")

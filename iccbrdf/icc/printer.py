@@ -190,7 +190,7 @@ class _Responses(FieldType):
     @staticmethod
     def _channel(reader: Reader, count: int) -> npt.NDArray[np.float64]:
         stored = np.frombuffer(reader.take(_RESPONSE.itemsize * count, "responses"), _RESPONSE)
-        reader.count_numbers(2 * count)
+        reader.count_numbers(16 * count)  # what is in memory on the way
         return np.stack([stored["code"].astype(np.float64), stored["value"] / 65536], axis=1)
 
     def write(self, out: bytearray, value: Sequence[npt.NDArray[np.float64]], record: Any) -> None:

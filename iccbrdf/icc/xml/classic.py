@@ -68,21 +68,25 @@ _LANGUAGE = Codec(
 
 
 class _Macintosh(Part):
-    """The Macintosh text: the bytes that are used, and how many are stored if not the usual number."""
+    """The Macintosh text: its bytes, how many of them are used if not all, and are stored if not 67."""
 
-    attributes = ("ScriptCode", "Stored")
+    attributes = ("ScriptCode", "Used", "Stored")
 
     def read(self, node: Node, seen: Seen) -> None:
         Attribute("ScriptCode", "script", U16).read(node, seen)
-        used = node.value(HEX, node.text)
+        data = node.value(HEX, node.text)
         stored = node.value(U8, node.attributes.get("Stored", str(MACINTOSH)), "Stored")
-        seen["macintosh"], seen["macintosh_size"] = used.ljust(stored, b"\0"), len(used)
+        used = node.value(U8, node.attributes["Used"], "Used") if "Used" in node.attributes else len(data)
+        seen["macintosh"], seen["macintosh_size"] = data.ljust(stored, b"\0"), used
 
     def write(self, out: Target, record: TextDescription) -> None:
+        data = record.macintosh[: max(record.macintosh_size, len(record.macintosh.rstrip(b"\0")))]
         out.set("ScriptCode", str(record.script))
+        if len(data) != record.macintosh_size:
+            out.set("Used", str(record.macintosh_size))
         if len(record.macintosh) != MACINTOSH:
             out.set("Stored", str(len(record.macintosh)))
-        out.write(HEX.write(record.macintosh[: record.macintosh_size]))
+        out.write(HEX.write(data))
 
 
 TYPE_FORMS.add(
@@ -101,7 +105,7 @@ TYPE_FORMS.add(
             "MacScript",
             _Macintosh(),
             default=lambda seen: {"macintosh": bytes(MACINTOSH), "macintosh_size": 0, "script": 0},
-            present=lambda r: r.script or r.macintosh_size or len(r.macintosh) != MACINTOSH,
+            present=lambda r: r.script or r.macintosh_size or r.macintosh != bytes(MACINTOSH),
         ),
     )
 )

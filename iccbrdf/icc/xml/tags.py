@@ -369,7 +369,7 @@ class _Vertices(Part):
         vertices = out.child("Vertices")
         for name, field in self._fields:
             values = getattr(record, field)
-            if values.size:
+            if values.shape[1]:
                 child = vertices.child(name)
                 child.set("channels", str(values.shape[1]))
                 write_numbers(child, values)
