@@ -296,9 +296,11 @@ def test_an_output_that_is_named_twice_at_a_time():
     [
         (b"pixelAspectRatio", b"pixelAspectRat\xff\xff", "expected UTF-8"),  # it brought the process down
         (b"kd.X", b"kd.\xff", "expected UTF-8"),
+        (b"box2i\0\x10", b"box2i\0\x14", "'dataWindow': found 20 bytes, expected what box2i"),  # so did it
         (b"comments\0string\0", b"comments\0strange\0", None),
         (b"v/1\x01\x02\0", b"v/1\x01\x02\x10", "several parts"),
         (b"chlist\0", b"chlist\0\xff\xff\xff", "cut off"),
+        (b"chlist\0\x3c", b"chlist\0\x3b", "'channels': found 59 bytes, expected what chlist"),
         (b"v/1\x01", b"v/2\x01", "cannot be read as OpenEXR"),
     ],
 )

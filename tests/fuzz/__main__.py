@@ -66,7 +66,10 @@ def _run(name: str, engine: str, seconds: float, seed: int, folder: Path) -> dic
     if counts_file.exists():
         counts |= json.loads(counts_file.read_text())
     if done.returncode:
-        counts["findings"][f"exit code {done.returncode}"] = {"error": f"see {log}", "times": 1}
+        counts["findings"][f"exit code {done.returncode}"] = {
+            "error": f"see {log} and what lies by it",
+            "times": 1,
+        }
     return counts | {"seconds": round(time.monotonic() - begun, 1)}
 
 

@@ -27,14 +27,18 @@ def by_mutation(name: str, seconds: float, seed: int, folder: Path) -> None:
     for data in pool:
         watch.run(data)
     draw = random.Random(seed)
+    # Stays behind where an input brings the process down.
+    current = folder / f"{name}-current"
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         data = mutated(draw.choice(pool), target.words, draw)
+        current.write_bytes(data)
         before = watch.taken
         watch.run(data)
         # What is taken is likely to be one change from what is just not.
         if watch.taken > before and len(pool) < 500 and len(data) < 50_000:
             pool.append(data)
+    current.unlink(missing_ok=True)
     _write(folder, name, watch.counts() | {"engine": "mutation"})
 
 
