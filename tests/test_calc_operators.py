@@ -202,6 +202,17 @@ def test_near_is_strict_at_its_tolerance():
     assert evaluate("near", [100, 100.00001], 1)[0] == 1
 
 
+@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (2, 5), (5, 5), (7, 3), (9, 9)])
+def test_solve_and_transpose_in_general(rows, columns):
+    random = np.random.default_rng(rows)
+    matrix, right = random.normal(size=(rows, columns)), random.normal(size=rows)
+    *x, flag = evaluate(f"solv({rows},{columns})", [*matrix.ravel(), *right], columns + 1, np.float64)
+    np.testing.assert_allclose(x, np.linalg.lstsq(matrix, right, rcond=None)[0], rtol=1e-9)
+    assert flag == 1
+    found = evaluate(f"tran({rows},{columns})", list(matrix.ravel()), rows * columns, np.float64)
+    np.testing.assert_array_equal(found, matrix.T.ravel())
+
+
 def test_solve_of_a_tile_with_singular_pixels():
     matrix = np.array([[2.0, 0, 0, 2, 6, 8], [1.0, 1, 1, 1, 6, 8]])
     x, y, flag = evaluate("solv(2,2)", list(matrix.T), 3)
