@@ -110,6 +110,20 @@ def spectral(**fields):
     return changed(scanner(), **fields)
 
 
+def encoding():
+    """A colour encoding of version 5 that is told by its name alone."""
+    profile = device_profile("cenc").replace(tags={"rfnm": Utf8("sRGB")}, remove=["wtpt"])
+    return changed(profile, pcs="", illuminant=(0, 0, 0))
+
+
+def named_colours():
+    """Spectra of named colours, without a device space."""
+    profile = device_profile("nmcl").replace(tags={"ncl2": TagArray("ncol", ())})
+    return changed(
+        profile, colour_space="", pcs="", spectral_pcs="rs001f", spectral_range=(400, 700), spectral_steps=31
+    )
+
+
 def conditions(**fields):
     stated = {"observer": 1, "illuminant": 2, "illuminant_XYZ": (95, 100, 109), "surround_XYZ": (0, 0, 0)}
     return under(D65, svcn=ViewingConditions(**stated | fields))
@@ -227,6 +241,7 @@ BROKEN = [
     ("HDR-006", lambda: changed(sound_mvis(), device_class="mviz"), "TAG-007"),
     ("HDR-007", lambda: changed(sound_mid(), colour_space="nope"), ""),
     ("HDR-007", lambda: changed(sound_mid(), colour_space=""), ""),
+    ("HDR-007", lambda: changed(named_colours(), colour_space="nope"), ""),
     ("HDR-008", lambda: changed(sound_mvis(), colour_space="RGB "), ""),
     ("HDR-009", lambda: changed(sound_mvis(), pcs="RGB "), ""),
     ("HDR-009", lambda: changed(sound_mid(), pcs="XYZ "), ""),
@@ -380,7 +395,10 @@ def a_pair(given, taken, options):
     return (one.to_bytes(), "mid.icc"), (other.to_bytes(), "mvis.icc")
 
 
-@pytest.mark.parametrize("make", [sound_mid, sound_mvis, lambda: under(D65), version_4, scanner, spectral])
+@pytest.mark.parametrize(
+    "make",
+    [sound_mid, sound_mvis, lambda: under(D65), version_4, scanner, spectral, encoding, named_colours],
+)
 def test_sound_profiles_break_nothing(make):
     assert fired(make()) == set()
 

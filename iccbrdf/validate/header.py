@@ -20,6 +20,10 @@ _CLASSES = {
 """Device classes by major version."""
 MULTIPLEX = ("mid ", "mlnk", "mvis")
 """Classes that have a multiplex space."""
+_NAMED = "nmcl"
+"""The class of named colours: in version 5 without a device space unless they have device values."""
+_ENCODING = "cenc"
+"""The class of colour encodings, which names one and may leave out what follows from the name."""
 _PLATFORMS = ("", "APPL", "MSFT", "SGI ", "SUNW", "TGNT")
 _RESERVED_FLAGS = 0xFFF0
 _LAST_FIELDS = 100
@@ -87,7 +91,9 @@ def _class_and_spaces(header: Header) -> Iterator[Finding]:
     if device_class in ("mvis", "mlnk"):
         if header.colour_space:
             yield _found("HDR-008", "colour space", f"found {header.colour_space!r}, expected zeros")
-    elif not channel_count(header.colour_space):
+    elif not channel_count(header.colour_space) and (
+        header.colour_space or device_class != _NAMED or version < 5
+    ):
         message = f"found {header.colour_space!r}, expected a colour space with channels, such as 'RGB '"
         yield _found("HDR-007", "colour space", message)
     yield from _connection_space(header)
@@ -111,8 +117,8 @@ def _connection_space(header: Header) -> Iterator[Finding]:
         if pcs:
             yield _found("HDR-009", "connection space", f"found {pcs!r}, expected zeros for a MID")
     elif header.device_class != "mlnk" and pcs not in ("XYZ ", "Lab "):
-        spectral_only = not pcs and header.spectral_pcs and header.version[0] >= 5
-        if not spectral_only:
+        left_out = header.spectral_pcs or header.device_class == _ENCODING
+        if pcs or not left_out or header.version[0] < 5:
             yield _found("HDR-009", "connection space", f"found {pcs!r}, expected 'XYZ ' or 'Lab '")
 
 
@@ -135,7 +141,7 @@ def _conditions(header: Header) -> Iterator[Finding]:
     written = " ".join(f"{v:g}" for v in found)
     if header.version[0] >= 5:
         # A profile that knows no connection space may leave it out.
-        left_out = not any(found) and header.device_class in ("mid ", "mlnk", "link")
+        left_out = not any(found) and header.device_class in ("mid ", "mlnk", "link", _ENCODING)
         if not left_out and min(found) <= 0:
             yield _found("HDR-013", "illuminant", f"found XYZ {written}, expected numbers above 0")
     elif max(abs(a - b) for a, b in zip(found, D50, strict=True)) > 1e-4:

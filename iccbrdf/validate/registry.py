@@ -92,7 +92,7 @@ TAGS: Mapping[str, Registered] = {
     "chrm": Registered(("chrm",)),
     "meas": Registered(("meas",)),
     "meta": Registered(("dict",)),
-    "ncl2": Registered(("ncl2",)),
+    "ncl2": Registered(("ncl2", "tary")),
     "ncol": Registered(("ncol",)),
     "nmcl": Registered(("tary",)),
     "pseq": Registered(("pseq",)),

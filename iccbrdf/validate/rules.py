@@ -182,8 +182,8 @@ _ROWS = (
          "ICC.2, 10.2.21"),
     Rule("PCC-003", "warning", "The header's illuminant is that of the viewing conditions, with Y = 1.",
          "ICC.2, 7.2"),
-    Rule("PCC-004", "error", "Conditions other than D50 and 2 degrees come with transforms to and from them "
-         "(tags c2sp, s2cp).", "ICC.2, 9.2"),
+    Rule("PCC-004", "warning", "Conditions other than D50 and 2 degrees come with transforms from and to "
+         "them (c2sp, s2cp).", "ICC.2, 9.2: no link with profiles of other conditions otherwise"),
     Rule("PCC-005", "warning", "A header illuminant other than D50 comes with viewing conditions (tag svcn).",
          f"{_REFERENCE} takes D50 without them"),
     Rule("PCC-006", "warning", "c2sp takes the illuminant to D50, s2cp D50 to the illuminant.", "ICC.2, 9.2"),
