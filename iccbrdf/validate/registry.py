@@ -57,7 +57,7 @@ TAGS: Mapping[str, Registered] = {
     "svcn": Registered(("svcn",)),
     "c2sp": Registered(_TRANSFORM),
     "s2cp": Registered(_TRANSFORM),
-    "swpt": Registered(_NUMBERS),
+    "swpt": Registered((*_NUMBERS, "smat")),
     "wtpt": Registered(("XYZ ",)),
     "bkpt": Registered(("XYZ ",)),
     "lumi": Registered(("XYZ ",)),
