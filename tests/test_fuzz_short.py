@@ -9,6 +9,7 @@ from importlib.util import find_spec
 
 import pytest
 from fuzz.mutations import mutated
+from fuzz.report import markdown
 from fuzz.targets import OF_FILES, TARGETS, quietly
 from fuzz.watch import TooSlow, Watch, time_limit
 
@@ -178,6 +179,21 @@ def test_what_is_too_slow_is_stopped():
 
     with pytest.raises(TooSlow), time_limit(0.05):
         endless()
+
+
+def test_a_report_adds_up():
+    found = {"KeyError at iccbrdf/a.py:7": {"error": "KeyError('x')", "times": 3}}
+    counts = {"inputs": 1000, "taken": 20, "seconds": 60.0, "worst_seconds": 0.5, "worst_memory_mib": 7}
+    text = markdown({
+        "xml (mutation)": {**counts, "findings": {}},
+        "xml (atheris)": {**counts, "worst_seconds": 2.25, "findings": found},
+    })  # fmt: skip
+    assert "2,000 inputs in 2 minutes" in text
+    assert "worst took 2.2 s" in text
+    assert "Findings: 1." in text
+    assert "| xml (atheris) | 1000 | 20 | 60.0 | 2.25 | 7 | 1 |" in text
+    assert "- `xml (atheris): KeyError at iccbrdf/a.py:7`, 3 times: KeyError('x')" in text
+    assert text.count("**xml**") == 1
 
 
 def test_mutations_repeat():
