@@ -8,7 +8,7 @@ import imagecodecs
 import numpy as np
 
 from iccbrdf.errors import InputError, LimitError
-from iccbrdf.files import StrPath
+from iccbrdf.files import StrPath, read_whole
 from iccbrdf.images.blocks import Array
 from iccbrdf.images.record import Samples
 from iccbrdf.images.tiff_reader import open_tiff
@@ -16,6 +16,8 @@ from iccbrdf.images.tiff_reader import open_tiff
 MAX_SAMPLES = 1 << 30
 
 _MOST_PNG_CHANNELS = 4
+_MOST_PNG_BYTES = 3 * MAX_SAMPLES
+"""Of a file: two for each sample, where nothing is gained by compression, and other chunks."""
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _IHDR_END = 24
 """The first bytes of a PNG: signature 8, length and name of IHDR 8, width 4, height 4."""
@@ -43,7 +45,7 @@ def read_picture(path: StrPath, samples: Samples | None = None) -> Array:
     UnsupportedError
         A TIFF of a kind that `open_tiff` does not read.
     LimitError
-        More than 2^30 samples (4 GiB in memory).
+        More than 2^30 samples (4 GiB in memory), or a PNG of more than 3 GiB.
     """
     try:
         with Path(path).open("rb") as file:
@@ -66,7 +68,7 @@ def _read_png(path: StrPath, start: bytes) -> Array:
     width, height = (int.from_bytes(start[i : i + 4], "big") for i in (16, 20))
     _check_size(path, height, width, _MOST_PNG_CHANNELS)
     try:
-        pixels = imagecodecs.png_decode(Path(path).read_bytes())
+        pixels = imagecodecs.png_decode(read_whole(path, _MOST_PNG_BYTES))
     except (RuntimeError, ValueError) as error:
         raise InputError(f"{path}: damaged PNG: {error}") from error
     picture: Array = np.divide(pixels, np.float32(np.iinfo(pixels.dtype).max), dtype=np.float32)
