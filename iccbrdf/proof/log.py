@@ -89,6 +89,9 @@ def earlier(job: Job, expected: str) -> dict[str, Any] | None:
 
 def _hashed(path: Path) -> dict[str, Any]:
     digest = hashlib.sha256()
+    # A job may name devices, which never end.
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is not a regular file")
     try:
         with path.open("rb") as file:
             while piece := file.read(1 << 20):
