@@ -43,11 +43,13 @@ def main() -> int:
             label = f"{name} ({engine})"
             results[label] = _run(name, engine, wanted.seconds / len(engines), wanted.seed, wanted.folder)
             print(row(label, results[label]), flush=True)
-    (wanted.folder / "report.json").write_text(json.dumps(results, indent=1) + "\n")
-    report = markdown(results)
-    for path in filter(None, (wanted.folder / "report.md", wanted.summary)):
-        path.write_text(report)
-        print(f"  -> {path}")
+            # Each time, for those who interrupt it.
+            (wanted.folder / "report.json").write_text(json.dumps(results, indent=1) + "\n")
+            (wanted.folder / "report.md").write_text(markdown(results))
+    print(f"  -> {wanted.folder / 'report.md'}")
+    if wanted.summary is not None:
+        wanted.summary.write_text(markdown(results))
+        print(f"  -> {wanted.summary}")
     return 1 if any(result["findings"] for result in results.values()) else 0
 
 
