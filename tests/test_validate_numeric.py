@@ -108,7 +108,8 @@ def test_shipped_profiles_pass_at_the_command_line(run):
     result = run("validate", "--numeric", place / "mid.icc", place / "mvis.icc", "--json")
     assert result.code == 0
     # The note of the private tag that holds the source.
-    assert [[found["rule"] for found in file["findings"]] for file in result.json["files"]] == [["TAG-009"]] * 2
+    rules = [[found["rule"] for found in file["findings"]] for file in result.json["files"]]
+    assert rules == [["TAG-009"], ["TAG-009"]]
 
 
 # Findings -----------------------------------------------------------------------------------------------
