@@ -1,7 +1,8 @@
 """All targets for minutes, with a report: PYTHONPATH=tests python -m fuzz [--seconds N] [-o FOLDER] [TARGET].
 
 Half of a target's time goes to seeded mutations, which anybody can repeat, half to atheris, which follows
-what it covers.  The report is report.md in the folder, the inputs that are findings lie beside it.
+what it covers.  The report is report.md in the folder, the inputs that are findings lie beside it.  What it
+said of other targets stays.
 Exit code 1 where there are any.
 """
 
@@ -37,14 +38,15 @@ def main() -> int:
     engines = ["mutation", "atheris"] if find_spec("atheris") else ["mutation"]
     if len(engines) == 1:
         print("atheris is not installed (pip install 'iccbrdf[dev]'): mutations alone", file=sys.stderr)
-    results: dict[str, dict[str, Any]] = {}
+    kept = wanted.folder / "report.json"
+    results: dict[str, dict[str, Any]] = json.loads(kept.read_text()) if kept.exists() else {}
     for name in targets:
         for engine in engines:
             label = f"{name} ({engine})"
             results[label] = _run(name, engine, wanted.seconds / len(engines), wanted.seed, wanted.folder)
             print(row(label, results[label]), flush=True)
             # Each time, for those who interrupt it.
-            (wanted.folder / "report.json").write_text(json.dumps(results, indent=1) + "\n")
+            kept.write_text(json.dumps(results, indent=1) + "\n")
             (wanted.folder / "report.md").write_text(markdown(results))
     print(f"  -> {wanted.folder / 'report.md'}")
     if wanted.summary is not None:
