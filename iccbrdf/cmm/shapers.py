@@ -120,7 +120,8 @@ def _inverse(curve: Curve | ParametricCurve | SegmentedCurve, place: str) -> Sam
             # Below -b/a the curve is flat.
             d, e = -b / np.float64(a), c
         turn = np.float32(np.float64(max(a * d + b, 0.0)) ** g + e)
-    if not (g > 0 and a > 0 and scale < np.finfo(np.float32).max and np.isfinite(turn)):
+        written = np.abs([turn, scale, e * scale]) < np.finfo(np.float32).max
+    if not (g > 0 and a > 0 and written.all()):
         raise ProfileError(f"{place}: found parameters {parameters}, whose curve has no inverse")
     upper = power(1 / g, scale, -e * scale, -b / a)
     if kind == 0:
