@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from iccbrdf.errors import UsageError
@@ -11,6 +13,8 @@ from iccbrdf.icc.xml.forms import Attribute, Form, Inside, Part, Seen, read_numb
 from iccbrdf.icc.xml.node import Node, Target
 from iccbrdf.icc.xml.values import U16
 
+_INTEGERS = (1, 2)
+"""Matrix types of 8 and of 16 bits."""
 _SMALL = 1 << 16
 """Entries of a matrix that may be written in full."""
 
@@ -21,9 +25,12 @@ class _Matrices(Part):
     children = ("SparseMatrix", "FullMatrix")
 
     def read(self, node: Node, seen: Seen) -> None:
-        seen["matrices"] = tuple(self._matrix(child) for child in node if child.name in self.children)
+        integers = seen["kind"] in _INTEGERS
+        seen["matrices"] = tuple(
+            self._matrix(child, integers) for child in node if child.name in self.children
+        )
 
-    def _matrix(self, node: Node) -> SparseMatrix:
+    def _matrix(self, node: Node, integers: bool) -> SparseMatrix:
         node.expect(("rows", "cols"), ("SparseRow",))
         rows, columns = (node.value(U16, node.get(name), name) for name in ("rows", "cols"))
         try:
@@ -31,10 +38,17 @@ class _Matrices(Part):
                 values = read_numbers(node, np.float32, 0)
                 if values.size != rows * columns:
                     raise node.error(f"found {values.size} numbers, expected {rows} x {columns}")
-                return SparseMatrix.of(values.reshape(rows, columns))
-            return self._sparse(node, rows, columns)
+                matrix = SparseMatrix.of(values.reshape(rows, columns))
+            else:
+                matrix = self._sparse(node, rows, columns)
         except UsageError as error:
             raise node.error(str(error)) from None
+        within = np.clip(matrix.values, 0, 1)
+        if not integers or np.array_equal(within, matrix.values):
+            return matrix
+        beyond = matrix.values[np.argmax(np.abs(matrix.values - within))]
+        node.warn(f"found {beyond:g}, but integers stand for 0..1: the nearest of these is taken")
+        return replace(matrix, values=within)
 
     @staticmethod
     def _sparse(node: Node, rows: int, columns: int) -> SparseMatrix:
