@@ -114,8 +114,8 @@ def test_matrices_in_full():
     assert tag_of(text.format("0 1 0.5 0")) == SparseMatrixArray(9, 2, (SparseMatrix.of([[0, 1], [0.5, 0]]),))
     with pytest.raises(ProfileError, match="found 3 numbers, expected 2 x 2"):
         tag_of(text.format("0 1 2"))
+    beyond = f'<PrivateTag TagSignature="abcd">{text.format("0 1.25 0.5 -0.125")}</PrivateTag>'
     with pytest.warns(ProfileWarning, match=r"found 1\.25, but integers stand for 0\.\.1"):
-        beyond = f'<PrivateTag TagSignature="abcd">{text.format("0 1.25 0.5 -0.125")}</PrivateTag>'
         cut = profile_from_xml(document(beyond))["abcd"]
     assert cut == SparseMatrixArray(9, 2, (SparseMatrix(2, 2, [0, 1, 3], [1, 0, 1], [1, 0.5, 0]),))
     assert tag_of(text.replace('"2">', '"4">', 1).format("2 0 0 0")).matrices[0].values == 2
