@@ -39,7 +39,10 @@ def main() -> int:
     if len(engines) == 1:
         print("atheris is not installed (pip install 'iccbrdf[dev]'): mutations alone", file=sys.stderr)
     kept = wanted.folder / "report.json"
-    results: dict[str, dict[str, Any]] = json.loads(kept.read_text()) if kept.exists() else {}
+    earlier = json.loads(kept.read_text()) if kept.exists() else {}
+    results: dict[str, dict[str, Any]] = {
+        label: counts for label, counts in earlier.items() if label.partition(" ")[0] in TARGETS
+    }
     for name in targets:
         for engine in engines:
             label = f"{name} ({engine})"
