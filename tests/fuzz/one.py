@@ -72,7 +72,7 @@ def by_coverage(name: str, seconds: float, seed: int, folder: Path) -> None:
     atheris.Setup(
         [
             "fuzz",
-            f"-max_total_time={int(seconds)}",
+            f"-max_total_time={max(1, round(seconds))}",  # 0 would be without an end
             f"-seed={seed}",
             *([f"-dict={words}"] if target.words else []),
             "-max_len=20000",

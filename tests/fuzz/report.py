@@ -61,4 +61,4 @@ def markdown(results: Mapping[str, Mapping[str, Any]]) -> str:
 
 def _summary(name: str) -> str:
     line, *_ = (TARGETS[name].run.__doc__ or "").split("\n")
-    return line[:1].lower() + line[1:].rstrip(".") + "."
+    return line
