@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+import tifffile
 from cmm_examples import WHITE, device_profile, matrix, mid, mvis, pixels, reference, scaled
 
 import iccbrdf
@@ -21,6 +22,7 @@ from iccbrdf.icc import (
     SegmentedCurve,
     Utf8,
     ViewingConditions,
+    write_profile,
 )
 
 SRGB = ParametricCurve(3, (2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045))
@@ -180,6 +182,40 @@ def test_the_conditions_of_another_profile():
         iccbrdf.link(chain, conditions={1: other})
     with pytest.raises(UsageError, match="conditions: found position 2, expected 0 to 1"):
         iccbrdf.link(chain, conditions={2: other})
+
+
+def test_apply_takes_both(run, tmp_path):
+    white = XYZ.of(0.5, 0.5, 0.25)
+    first = device_profile("scnr", A2B1=scaled(1)).replace(tags={"wtpt": white})
+    last = device_profile("prtr", B2A1=scaled(1)).replace(tags={"wtpt": white})
+    svcn = ViewingConditions(2, 6, (1.1, 1.0, 0.35), (1.1, 1.0, 0.35))
+    other = device_profile("spac", illuminant=(1.1, 1.0, 0.35), svcn=svcn, c2sp=scaled(0.5), A2B1=scaled(1))
+    paths = [tmp_path / f"{name}.icc" for name in ("first", "last", "other")]
+    for path, profile in zip(paths, (first, last, other), strict=True):
+        write_profile(profile, path)
+    image = tmp_path / "image.tif"
+    tifffile.imwrite(image, np.ones((1, 1, 3), np.float32), photometric="minisblack", planarconfig="contig")
+
+    def applied(*options):
+        command = ("apply", image, "-p", paths[0], "-p", paths[1], "-o", tmp_path / "out.tif", "--force")
+        return run(*command, "--samples", "device", *options)
+
+    for options, intents, conditions in (
+        (("--intent", "absolute,relative"), ["absolute", "relative"], {}),
+        (("--conditions", f"1={paths[2]}"), "relative", {0: other}),
+    ):
+        result = applied(*options)
+        assert (result.code, result.err) == (0, "")
+        found = tifffile.imread(tmp_path / "out.tif").reshape(-1)
+        assert not np.allclose(found, 1)
+        expected = iccbrdf.link([first, last], intent=intents, conditions=conditions)([1, 1, 1])
+        np.testing.assert_array_equal(found, expected)
+    for options, message in (
+        (("--intent", "absolute,relativ"), "did you mean 'relative'"),
+        (("--conditions", "0=other.icc"), "--conditions '0=other.icc': expected PLACE=PROFILE"),
+    ):
+        result = applied(*options)
+        assert (result.code, message in result.err) == (2, True), result.err
 
 
 def extended(profile):

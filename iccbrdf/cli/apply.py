@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -108,6 +109,17 @@ def _recompiled(
     return chain, rest, [name for name in without if name not in known]
 
 
+def _conditions(items: Sequence[str]) -> dict[int, Path]:
+    """Profiles by the position, from 0, of those for whose viewing conditions theirs stand in."""
+    found = {}
+    for item in items:
+        place, equals, path = item.partition("=")
+        if not equals or not place.isdecimal() or int(place) == 0:
+            raise UsageError(f"--conditions {item!r}: expected PLACE=PROFILE, such as 2=d65.icc")
+        found[int(place) - 1] = Path(path)
+    return found
+
+
 @click.command("apply", epilog=EPILOG)
 @click.argument("image", type=click.Path(path_type=Path))
 @click.option("-p", "--profile", "profiles", multiple=True, required=True, type=click.Path(path_type=Path),
@@ -125,7 +137,11 @@ def _recompiled(
               help="Effects to leave out: of these four and, where a profile holds its source, fresnel, "
               "shadowing, below-horizon and highlight-range, which --effects puts back.")  # fmt: skip
 @backend_option
-@click.option("--intent", type=click.Choice(INTENTS), default="relative", show_default=True)
+@click.option("--intent", "intents", metavar="NAMES", default="relative", show_default=True,
+              help=f"{', '.join(INTENTS)}; or one for each profile, separated by commas.")  # fmt: skip
+@click.option("--conditions", multiple=True, metavar="PLACE=PROFILE",
+              help="A profile whose viewing conditions stand in for those of the one at this place of the "
+              "chain, from 1; repeatable.")  # fmt: skip
 @click.option("--samples", type=click.Choice(("device", "real")),
               help="What a float image holds, where it does not say so itself: device values 0..1, or real "
               "ones (signed normals, physical parameters).")  # fmt: skip
@@ -175,7 +191,8 @@ def command(
     effects: str | None,
     left_out: str | None,
     backend: str,
-    intent: str,
+    intents: str,
+    conditions: tuple[str, ...],
     samples: Samples | None,
     channels: str | None,
     normal_map: Path | None,
@@ -229,7 +246,8 @@ def command(
                 raise UsageError(f"name the image's {opened.channels} channels with --channels")
             source, declared = WithNormals(opened, own, normals), None
         settings: dict[str, Any] = {
-            "intent": intent,
+            "intent": intents if intents in INTENTS else name_list(intents),
+            "conditions": _conditions(conditions),
             "dtype": "float64" if double else "float32",
             "samples": source.samples,
             "backend": backend,
@@ -261,7 +279,7 @@ def command(
             "channels_in": list(transform.channels_in),
             "channels_out": list(transform.channels_out),
             "profiles": [str(path) for path in profiles],
-            "intent": intent,
+            "intent": intents,
             "env": dict(transform.env),
             "backend": transform.backend,
             "backend_reason": transform.execution.reason,
