@@ -42,7 +42,7 @@ cost: $(VENV)/installed
 # Hours, if one likes.
 fuzz: $(VENV)/installed
 	$(BIN)/python tools/hard_cases.py
-	$(BIN)/python -m tests.fuzz
+	PYTHONPATH=tests $(BIN)/python -m fuzz --summary docs/fuzz.md
 
 clean:
 	rm -rf $(VENV) demo build *.egg-info .mypy_cache .ruff_cache .pytest_cache
