@@ -69,6 +69,7 @@ class NumpyKernel:
         except IndexError:
             planes = _Planes(self._layout, self._dtype, self.tile)
         uniform = self._uniform(arguments)
+        pixels = pixels.astype(self._dtype, copy=False)
         with np.errstate(all="ignore"):
             for start in range(0, len(pixels), self.tile):
                 part = slice(start, start + self.tile)
@@ -128,13 +129,14 @@ class _Layout:
         arguments, count = buffers + 2 * numbers + 2 * masks, len(plan.arguments)
         views = (View.NUMBER, View.BITS, View.MASK, View.WIDE)
         self._start |= {(Kind.ARGUMENT, view): arguments + i * count for i, view in enumerate(views)}
-        self._constants: list[np.generic] = []
+        self._constants: list[NDArray[Any]] = []
         self._end = arguments + len(views) * count
 
     def at(self, operand: Operand) -> int:
         """The position of an operand; a constant is given one."""
         if not isinstance(operand, Place):
-            self._constants.append(operand)
+            # NumPy takes arrays without dimensions more quickly than numbers.
+            self._constants.append(np.asarray(operand))
             return self._end + len(self._constants) - 1
         register = operand.register
         index = self.allocation.buffer.get(register, register.index)
@@ -145,7 +147,8 @@ class _Layout:
         numbers = np.array(arguments, dtype)
         masks = numbers >= 0.5
         integer = np.dtype(f"i{dtype.itemsize}")
-        return [*numbers, *numbers.view(integer), *masks, *-masks.astype(integer), *self._constants]
+        views = numbers, numbers.view(integer), masks, -masks.astype(integer)
+        return [*(np.asarray(value) for view in views for value in view), *self._constants]
 
 
 def _bound(steps: Steps, layout: _Layout) -> Bound:
