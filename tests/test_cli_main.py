@@ -70,7 +70,7 @@ def test_without_a_command_help_goes_to_stderr(run):
         (["apply", "a.tif", "-p", "b.icc"], "Missing option '-o'"),
         (["apply", "a.tif", "-p", "b.icc", "-o", "c.tif", "--workers", "0"], "--workers"),
         (["apply", "a.tif", "-p", "b.icc", "-o", "c.tif", "--exposure", "0"], "--exposure"),
-        (["apply", "a.tif", "-p", "b.icc", "-o", "c.tif", "--intent", "vivid"], "'vivid' is not one of"),
+        (["apply", "a.tif", "-p", "b.icc", "-o", "c.tif", "--intent", "vivid"], "'vivid' is unknown"),
     ],
 )
 def test_usage_errors(run, arguments, message):

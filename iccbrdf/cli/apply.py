@@ -30,7 +30,7 @@ from iccbrdf.cli.pipeline import (
 )
 from iccbrdf.cmm import INTENTS, MAX_COST, link
 from iccbrdf.cmm.effects import SUBSTITUTES
-from iccbrdf.errors import UsageError
+from iccbrdf.errors import UsageError, nearest
 from iccbrdf.icc import Profile, read_profile
 from iccbrdf.images import ImageSource, Samples, WithNormals, processors
 from iccbrdf.images.blocks import Array
@@ -109,6 +109,15 @@ def _recompiled(
     return chain, rest, [name for name in without if name not in known]
 
 
+def _intents(_context: click.Context, _option: click.Parameter, text: str) -> str | list[str]:
+    """What --intent asks for, as `link` takes it."""
+    names = name_list(text)
+    for name in names:
+        if name not in INTENTS:
+            raise click.BadParameter(f"{name!r} is unknown: {nearest(name, INTENTS)}")
+    return names[0] if len(names) == 1 else names
+
+
 def _conditions(items: Sequence[str]) -> dict[int, Path]:
     """Profiles by the position, from 0, of those for whose viewing conditions theirs stand in."""
     found = {}
@@ -137,7 +146,7 @@ def _conditions(items: Sequence[str]) -> dict[int, Path]:
               help="Effects to leave out: of these four and, where a profile holds its source, fresnel, "
               "shadowing, below-horizon and highlight-range, which --effects puts back.")  # fmt: skip
 @backend_option
-@click.option("--intent", "intents", metavar="NAMES", default="relative", show_default=True,
+@click.option("--intent", metavar="NAMES", default="relative", show_default=True, callback=_intents,
               help=f"{', '.join(INTENTS)}; or one for each profile, separated by commas.")  # fmt: skip
 @click.option("--conditions", multiple=True, metavar="PLACE=PROFILE",
               help="A profile whose viewing conditions stand in for those of the one at this place of the "
@@ -191,7 +200,7 @@ def command(
     effects: str | None,
     left_out: str | None,
     backend: str,
-    intents: str,
+    intent: str | list[str],
     conditions: tuple[str, ...],
     samples: Samples | None,
     channels: str | None,
@@ -219,6 +228,7 @@ def command(
     of `iccbrdf build` the BRDF parameters and the normal, for a colour MID XYZ and the normal.  A colour MID
     alone writes the BRDF image, encoded for the binding MID.
     """
+    stated = _conditions(conditions)
     wanted, gone = _effects(effects, left_out), _names(left_out or "")
     chain, kept, omitted = _recompiled([read_profile(path) for path in profiles], wanted, gone)
     last = chain[-1]
@@ -246,8 +256,8 @@ def command(
                 raise UsageError(f"name the image's {opened.channels} channels with --channels")
             source, declared = WithNormals(opened, own, normals), None
         settings: dict[str, Any] = {
-            "intent": intents if intents in INTENTS else name_list(intents),
-            "conditions": _conditions(conditions),
+            "intent": intent,
+            "conditions": stated,
             "dtype": "float64" if double else "float32",
             "samples": source.samples,
             "backend": backend,
@@ -279,7 +289,7 @@ def command(
             "channels_in": list(transform.channels_in),
             "channels_out": list(transform.channels_out),
             "profiles": [str(path) for path in profiles],
-            "intent": intents,
+            "intent": intent,
             "env": dict(transform.env),
             "backend": transform.backend,
             "backend_reason": transform.execution.reason,
