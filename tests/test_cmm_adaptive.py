@@ -242,7 +242,7 @@ def test_passes_report_what_they_did():
     kind = next(k for k in auto.execution.kinds.values() if k.name == "n constant, ks 0")
     assert kind.reports[0].name == "hold channels"
     assert dict(kind.reports[0].changes) == {"constant channel": 3, "channel that is 0": 3}
-    folding = kind.specials[-1].reports[0]
+    folding = kind.specials[0].reports[0]
     assert folding.name == "fold what is decided"
     assert folding.after < 0.7 * folding.before
     assert {"product with 0", "sum with 0"} <= dict(folding.changes).keys()
