@@ -146,7 +146,7 @@ def test_no_longer_than_they_were():
     # A rise is a worse compiler or a richer model: to be seen, not to be found out later.
     counts = {model: compiled(model).executed for model in MODELS}
     counts["brdf2"] = compiled("cook_torrance", chromatic_roughness=True).executed
-    limits = {"cook_torrance": 135, "cook_torrance_2020": 132, "ward": 100, "brdf2": 139}
+    limits = {"cook_torrance": 142, "cook_torrance_2020": 139, "ward": 107, "brdf2": 147}
     assert all(counts[model] <= limits[model] for model in limits), counts
 
 

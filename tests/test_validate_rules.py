@@ -89,7 +89,7 @@ def test_a_profile_whose_program_was_changed_is_told_of():
     other = replace(calculator, program=(*calculator.program, *parse("0 pop")))
     report = validate(profile.replace(tags={"M2B0": MultiProcess.of(other)}).to_bytes())
     (found,) = (finding for finding in report.findings if finding.rule.id == "SRC-002")
-    assert "tag M2B0, element 0: the source compiles to another program, of 137 operations, found 139" in (
+    assert "tag M2B0, element 0: the source compiles to another program, of 144 operations, found 146" in (
         found.text
     )
 
