@@ -19,7 +19,7 @@ from iccbrdf.calc.exact_passes import EXACT_PASSES
 from iccbrdf.calc.graph import Graph, check
 from iccbrdf.calc.passes import optimise
 from iccbrdf.calc.program import parse
-from iccbrdf.calc.schedule import Branch, computed, uniform_values
+from iccbrdf.calc.schedule import Branch, computed, schedule, uniform_values
 from iccbrdf.errors import UnsupportedError
 from iccbrdf.icc import Clut, CurveSet, Matrix, SampledCalculatorCurve, TintArray
 from iccbrdf.resources import folder
@@ -155,6 +155,20 @@ def test_passes_report_what_they_did():
         ("mul", None),
     ]
     assert "simplify arithmetic: 5 -> 3 nodes" in "\n".join(map(str, reports))
+
+
+@pytest.mark.parametrize(("constant", "products"), [(0.75, 3), (-1.0, 3), (1.5, 4)])
+def test_products_with_a_condition_share_the_condition_times_the_value(constant, products):
+    """t (x c) = (t x) c but where x c is infinite and x is not."""
+    graph = Graph(dtype=np.float32)
+    x, taken = graph.input(0), graph.apply("lt", graph.input(1), graph.input(0))
+    scaled = [graph.apply("mul", x, graph.number(c)) for c in (constant, 0.5)]
+    graph.outputs = tuple(graph.apply("mul", taken, value) for value in scaled)
+    result, _ = optimise(graph, EXACT_PASSES)
+    assert sum(node.op == "mul" for node in result.live()) == products
+    ends = np.float32([[3e38, 3.1e38], [-3e38, -3.1e38], [1e-45, 0]])
+    pixels = np.concatenate([hard_pixels(2000, 2), ends])
+    assert same_bits(walk(schedule(result, 2), pixels), walk(schedule(graph, 2), pixels))
 
 
 @pytest.mark.parametrize(

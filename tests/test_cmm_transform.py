@@ -177,6 +177,12 @@ def test_variables_of_an_existing_transform():
     assert first.env == {"a": 8}
 
 
+def test_zeros_of_either_sign_are_different_variables():
+    one = iccbrdf.link([variable("1 env(a) pop div out(0)")], env={"a": 0.0})
+    other = one.with_env({"a": -0.0})
+    assert [t([0]).tolist() for t in (one, other, one)] == [[np.inf], [-np.inf], [np.inf]]
+
+
 @pytest.mark.parametrize("change", [lambda env: iccbrdf.link([variable()], env=env),
                                     lambda env: iccbrdf.link([variable()]).with_env(env)])  # fmt: skip
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from llvm_examples import POSSIBLE, run, ulps_apart
 from iccbrdf import read_profile
 from iccbrdf.calc.elements import apply
 from iccbrdf.calc.graph import LOGIC, TRUTHS, Graph
-from iccbrdf.calc.llvm import codegen, compile_llvm, engine, target, wide
+from iccbrdf.calc.llvm import codegen, compile_llvm, engine, operands, order, target, wide
 from iccbrdf.calc.operators import OPERATORS
 from iccbrdf.calc.program import parse
 from iccbrdf.calc.schedule import Branch, Schedule, computed, schedule, uniform_values
@@ -50,6 +50,7 @@ def rounded_once(monkeypatch):
     def library(name):
         return lambda *values: values[0].code.each_lane(name, *values)
 
+    monkeypatch.setattr(codegen, "_PLAIN", {})
     names = {"ln": "log", "log": "log10"}
     for op in ("exp", "ln", "log", "sin", "cos", "tan", "asin", "acos", "atan", "cbrt", "pow"):
         monkeypatch.setitem(codegen._SINGLE, op, library(names.get(op, op)))
@@ -184,6 +185,74 @@ def test_code_made_with_less_care(width, monkeypatch, rounded_once):
         if not any(node.op == "solve" for node in computed(plan.body)):
             pixels = hard_pixels(40, INPUTS, np.float32, seed)
             assert same_bits(run(plan, pixels, width=width), walk(plan, pixels)), seed
+
+
+# What is left out, and in which order ---------------------------------------------------------------------
+
+
+@widths
+@dtypes
+@pytest.mark.parametrize(("least", "greatest", "factor", "skipped"), [
+    (1e-30, 1e15, 0.7, (True, True)), (1e-30, 1e15, -0.7, (True, False)), (1e-30, 1e15, 1e300, (True, False)),
+    (1e-30, np.inf, 0.7, (False, False)), (0.0, 1e15, 0.7, (False, False)), (-1.0, 1e15, 0.7, (False, False)),
+])  # fmt: skip
+def test_sums_of_what_conditions_choose(least, greatest, factor, skipped, dtype, width):
+    """What is not chosen is skipped where 0 times it changes nothing: not if it may be infinite or -0."""
+    graph = Graph(dtype=dtype)
+    x = [graph.input(i) for i in range(4)]
+    w = [graph.apply("vmax", each, graph.number(least)) for each in x]
+    w = [graph.apply("vmin", each, graph.number(greatest)) for each in w]
+    place, total, weighted = graph.number(0.0), w[0], graph.apply("mul", w[0], graph.number(factor))
+    for i in range(1, 4):
+        taken = graph.apply("lt", x[i], x[0])
+        place = graph.apply("add", place, taken)
+        part = graph.apply("mul", taken, w[i])
+        total = graph.apply("add", part, total)
+        weighted = graph.apply("add", weighted, graph.apply("mul", part, graph.number(factor)))
+    graph.outputs = (place, total, weighted, graph.apply("mul", graph.apply("gt", x[1], x[2]), w[3]))
+    plan = schedule(graph, 4)
+    known = operands.Operands(plan)
+    assert tuple(known.masked(node) is not None for node in graph.outputs[:3]) == (True, *skipped)
+    pixels = hard_pixels(1000, 4, dtype)
+    assert same_bits(run(plan, pixels, width=width), walk(plan, pixels))
+
+
+def in_order(block, done):
+    """Whether each node comes after what it reads; `done` grows."""
+    for item in block:
+        if isinstance(item, Branch):
+            if item.condition not in done or not in_order(item.yes, done) or not in_order(item.no, done):
+                return False
+            done.update(item.selects)
+        else:
+            if not done.issuperset(item.arguments):
+                return False
+            done.add(item)
+    return True
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_order_is_of_all_nodes_each_after_what_it_reads(name):
+    profile = read_profile(folder("profiles") / f"{name}.icc")
+    plan = scheduled(profile["A2M0" if "A2M0" in profile else "M2B0"].elements[-1])
+    known = {node for node in plan.graph.nodes if node.op == "const"} | set(plan.arguments)
+    for block in (plan.body, order.in_turn(plan.body, lambda node: node.arguments)):
+        done = set(known)
+        assert in_order(block, done)
+        assert done - known == set(computed(plan.body))
+
+
+def test_long_chains_of_conditions_and_sums_are_no_harm():
+    graph = Graph(dtype=np.float32)
+    condition = graph.apply("lt", graph.input(0), graph.input(1))
+    total = graph.apply("add", condition, condition)
+    for number in range(3000):
+        condition = graph.apply("vand", condition, graph.apply("gt", graph.input(0), graph.number(-number)))
+        total = graph.apply("add", total, total) if number < 100 else graph.apply("add", total, condition)
+    graph.outputs = (total, condition)
+    plan = schedule(graph, 2)
+    pixels = hard_pixels(64, 2)
+    assert same_bits(run(plan, pixels), walk(plan, pixels))
 
 
 # Branches ----------------------------------------------------------------------------------------------

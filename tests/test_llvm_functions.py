@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 from graph_examples import same_bits
-from llvm_examples import POSSIBLE, computed, numbers, pairs, special_numbers, ulps_apart
+from llvm_examples import POSSIBLE, computed, numbers, pairs, run, special_numbers, ulps_apart
 
+from iccbrdf.calc.graph import Graph
 from iccbrdf.calc.operators import OPERATORS
+from iccbrdf.calc.schedule import schedule
 
 EXACT = (
     "neg", "abs", "sqrt", "flor", "ceil", "trnc", "rond", "sign", "rnum",
@@ -54,6 +56,25 @@ def test_functions_of_one_number(op, width):
     low, high = RANGES[op]
     dense = np.linspace(low, high, 200_001).astype(np.float32)
     assert_close(op, [np.concatenate([numbers(50_000), dense])], width)
+
+
+@widths
+@pytest.mark.parametrize(("op", "low", "high"), [
+    ("exp", -87, 88), ("exp", -87.1, 88), ("exp", -87, 89), ("sin", -1.5, 1.5), ("sin", -1.6, 1.5),
+    ("cbrt", 2.0**-100, np.inf), ("cbrt", 2.0**-110, np.inf), ("cbrt", -1, 1),
+])  # fmt: skip
+def test_functions_of_numbers_known_to_lie_within_bounds(op, low, high, width):
+    graph = Graph(dtype=np.float32)
+    bounded = graph.apply("vmax", graph.input(0), graph.number(low))
+    if np.isfinite(high):
+        bounded = graph.apply("vmin", bounded, graph.number(high))
+    graph.outputs = (graph.apply(op, bounded),)
+    values = np.concatenate([numbers(20_000), np.linspace(-100, 100, 50_001).astype(np.float32)])
+    # NaN becomes the first bound.
+    inside = np.where(values > np.float32(low), values, np.float32(low))
+    expected = wanted(op, [np.minimum(inside, np.float32(high))])
+    found = run(schedule(graph, 1), values[:, None], width=width)[:, 0]
+    assert ulps_apart(found, expected).max() <= ULPS
 
 
 @widths

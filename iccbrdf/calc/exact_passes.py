@@ -76,6 +76,23 @@ def power(graph: Graph, node: Node) -> Node | None:
     return None
 
 
+def condition_first(graph: Graph, node: Node) -> Node | None:
+    """t (x c) = (t x) c for a condition t and |c| <= 1, so that products of x with several c share t x.
+
+    Where t is 0 both are a zero of the same sign, or NaN: x c is infinite only if x is.
+    """
+    if node.op != "mul":
+        return None
+    for condition, product in (node.arguments, node.arguments[::-1]):
+        if not is_truth(condition) or product.op != "mul":
+            continue
+        for factor, number in (product.arguments, product.arguments[::-1]):
+            value = uniform(number)
+            if value is not None and abs(value) <= 1:
+                return graph.add("mul", [graph.add("mul", [condition, factor]), number])
+    return None
+
+
 # Conditions --------------------------------------------------------------------------------------------
 
 
@@ -158,7 +175,7 @@ def fix_variables(values: Mapping[str, float]) -> Rule:
 
 EXACT_PASSES: Passes = (
     ("fold constants", (constant, known_condition, known_truth)),
-    ("simplify arithmetic", (neutral, sign, reciprocal, power)),
+    ("simplify arithmetic", (neutral, sign, reciprocal, power, condition_first)),
     ("simplify conditions", (truth_as_number, condition_of_numbers, opposite, repeated_condition)),
 )
 """The passes in their order; `optimise` runs them until none finds anything to do."""

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from iccbrdf.calc import elements
-from iccbrdf.calc.graph import Graph, Node, is_truth, meaning
+from iccbrdf.calc.graph import Graph, Node, is_truth, meaning, needed_by
 from iccbrdf.calc.meanings import solve
 from iccbrdf.calc.program import signature
 
@@ -43,9 +43,9 @@ class Schedule:
     channels: int
     """The number of input channels."""
     uniform: tuple[Node, ...]
-    """Nodes that depend on constants and run-time variables alone, in order."""
+    """What the arguments are computed from: nodes that depend on constants and run-time variables alone."""
     arguments: tuple[Node, ...]
-    """Those of them that the body or the outputs read, but for constants."""
+    """Nodes of this kind that the body or the outputs read, but for constants."""
     body: Block
     """What differs from pixel to pixel."""
 
@@ -78,13 +78,12 @@ def schedule(graph: Graph, channels: int) -> Schedule:
     varying = [node for node in live if node not in uniform]
     read = dict.fromkeys(argument for node in varying for argument in node.arguments)
     read |= dict.fromkeys(graph.outputs)
+    arguments = sorted((n for n in read if n in uniform and n.op != "const"), key=lambda node: node.index)
     return Schedule(
         graph=graph,
         channels=channels,
-        uniform=tuple(node for node in live if node in uniform),
-        arguments=tuple(
-            sorted((n for n in read if n in uniform and n.op != "const"), key=lambda node: node.index)
-        ),
+        uniform=tuple(needed_by(arguments)),
+        arguments=tuple(arguments),
         body=_arrange(varying, [output for output in graph.outputs if output not in uniform]),
     )
 
@@ -163,6 +162,7 @@ def _arrange(varying: Sequence[Node], outputs: Sequence[Node]) -> Block:
     inside = set(varying)
     group_of = _groups(varying, inside) if len(varying) <= MAX_ARRANGED else {}
     units = _in_order([group_of.get(output, output) for output in outputs], group_of, inside)
+    units = _soon(units, group_of, inside)
     paths = _paths(units, outputs, group_of, inside)
     kept = _worthwhile(units, paths)
     blocks: dict[_Path, list[Node | Branch]] = {}
@@ -242,6 +242,38 @@ def _in_order(
                 order.setdefault(stack.pop()[0])
             else:
                 stack.append((following, _sources(following, group_of, inside)))
+    return list(order)
+
+
+def _soon(units: Sequence[_Unit], group_of: Mapping[Node, _Group], inside: set[Node]) -> list[_Unit]:
+    """The same order, but what is the last to read something comes as soon as it can: less has to be kept."""
+    sources = {unit: {source for source, _ in _sources(unit, group_of, inside)} for unit in units}
+    # By unit, what has yet to read it; a dict, as the order counts.
+    waiting: dict[_Unit, dict[_Unit, None]] = {unit: {} for unit in units}
+    for unit, read in sources.items():
+        for source in read:
+            waiting[source][unit] = None
+    missing = {unit: len(read) for unit, read in sources.items()}
+    order: dict[_Unit, None] = {}
+    for first in units:
+        stack = [first]
+        while stack:
+            unit = stack.pop()
+            if unit in order:
+                continue
+            order[unit] = None
+            near = list(waiting[unit])
+            for reader in near:
+                missing[reader] -= 1
+            for source in sources[unit]:
+                del waiting[source][unit]
+                if len(waiting[source]) == 1:
+                    near += waiting[source]
+            stack += [
+                reader
+                for reader in near
+                if not missing[reader] and any(len(waiting[source]) == 1 for source in sources[reader])
+            ]
     return list(order)
 
 

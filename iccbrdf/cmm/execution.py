@@ -133,6 +133,7 @@ class Compiled:
         self._looks = backend == "numpy"
         self.schedule, self.reports = self._lifted(finite_inputs=self._looks)
         self._finite = COMPILERS[backend](self.schedule)
+        self._last: tuple[tuple[tuple[str, str], ...] | None, Sequence[np.generic]] = (None, ())
 
     def _lifted(self, *, finite_inputs: bool) -> tuple[Schedule, tuple[Report, ...]]:
         graph = Graph(dtype=self._dtype.type)
@@ -162,7 +163,7 @@ class Compiled:
 
     def runs(self, env: Mapping[str, float]) -> tuple[TileRun, TileRun]:
         """What maps tiles of finite numbers under these run-time variables, and what maps any."""
-        arguments = uniform_values(self.schedule, env)
+        arguments = self._arguments(env)
 
         def finite(tile: Array, out: Array) -> None:
             self._finite.run(tile, out, arguments)
@@ -172,6 +173,14 @@ class Compiled:
             kernel.run(tile, out, uniform_values(plan, env))
 
         return finite, anything
+
+    def _arguments(self, env: Mapping[str, float]) -> Sequence[np.generic]:
+        """The values of the schedule's arguments; those of the last variables are kept."""
+        # 0 and -0 are equal, but are not the same light.
+        key = tuple((name, float(value).hex()) for name, value in env.items())
+        if self._last[0] != key:
+            self._last = key, uniform_values(self.schedule, env)
+        return self._last[1]
 
     def bind(self, env: Mapping[str, float]) -> Run:
         finite, anything = self.runs(env)

@@ -7,7 +7,7 @@ a side that no pixel of the block needs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iccbrdf.calc.graph import Node, is_truth
+from iccbrdf.calc.intervals import Interval
 from iccbrdf.calc.llvm import functions, lookup, wide
 from iccbrdf.calc.llvm.assembler import Assembler, Type, Value
+from iccbrdf.calc.llvm.operands import Masked, Operands
+from iccbrdf.calc.llvm.order import in_turn
 from iccbrdf.calc.llvm.rows import load_channels, store_channels
 from iccbrdf.calc.llvm.target import Target
 from iccbrdf.calc.schedule import Block, Branch, Schedule, computed
@@ -24,9 +27,9 @@ from iccbrdf.errors import UnsupportedError
 
 ENTRY = "kernel"
 """The function: (pixels, out, number of blocks, arguments, tables)."""
-MOST_INLINE = 64
-"""Elementary functions up to which each is written out where it is used.  Beyond, calls make a tenth more
-run time and a third of the time to compile, which then matters more."""
+MOST_INLINE = 48
+"""Elementary functions up to which each is written out where it is used.  Beyond, calls take half the time to
+compile, and code that is called stays in the processor's caches."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,13 @@ class _Body:
         self.tables = lookup.Tables(self.code)
         self.values: dict[Node, Value] = {}
         self.several: dict[Node, list[Value]] = {}
+        self.operands = Operands(schedule)
+        found = ((node, self.operands.masked(node)) for node in computed(schedule.body))
+        self.masked = {node: masked for node, masked in found if masked is not None}
+        self.body = in_turn(_part(schedule.body, self._needed()), self._reads)
+        self.as_numbers = frozenset(self._conditions_as_numbers())
+        self.numbers: dict[Node, Value] = {}
+        """Conditions as 1 and 0: made at once, as a processor has registers for few conditions."""
 
     def write(self) -> str:
         code, schedule, real = self.code, self.schedule, self.type.element
@@ -72,12 +82,12 @@ class _Body:
         source, sink = code.address("%pixels", real, read), code.address("%out", real, written)
         self._inputs(source)
         self._arguments()
-        self._block(schedule.body)
+        self._block(self.body)
         store_channels(code, sink, [self.number(output) for output in schedule.graph.outputs])
         lines = [
             *code.needed.values(),
             f"define void @{ENTRY}(ptr noalias readonly %pixels, ptr noalias writeonly %out, i64 %blocks, "
-            "ptr noalias readonly %arguments, ptr noalias readonly %tables) {",
+            "ptr noalias readonly %arguments, ptr noalias readonly %tables) alignstack(64) {",
             "entry:",
             *code.buffers,
             *self.tables.prologue(),
@@ -131,7 +141,9 @@ class _Body:
             self._block(block)
             return [self.values[node] for node in results]
 
-        self.values.update(zip(results, self.code.where_any(mask, compute), strict=True))
+        for node, value in zip(results, self.code.where_any(mask, compute), strict=True):
+            self.values[node] = value
+            self.numbers.pop(node, None)
 
     def _node(self, node: Node) -> None:
         if node.op in _SEVERAL:
@@ -145,18 +157,60 @@ class _Body:
             self.values[node] = lookup.curve(self.tables, node.detail, self.number(node.arguments[0]))
         elif node.op == "pow" and self.type.element == "float" and node.arguments[1].op == "const":
             self.values[node] = wide.known_power(self.number(node.arguments[0]), node.arguments[1].detail[0])
+        elif node in self.masked:
+            self.values[node] = self._masked(self.masked[node])
         elif node.op in _LOGIC:
             self.values[node] = _LOGIC[node.op](*map(self.truth, node.arguments))
         else:
-            self.values[node] = self._function(node.op, self._numbers(node))
+            self.values[node] = self._function(node, self._numbers(node))
+        if node in self.as_numbers:
+            self.numbers[node] = self.number(node)
 
-    def _function(self, op: str, values: Sequence[Value]) -> Value:
+    def _function(self, node: Node, values: Sequence[Value]) -> Value:
+        op = node.op
         if op in _OPERATORS:
             return _OPERATORS[op](*values)
-        special = _SINGLE if self.type.element == "float" else _DOUBLE
+        single = self.type.element == "float"
+        if single and op in _PLAIN and self.operands.within(node, _PLAIN[op][0]):
+            return self.code.apply(f"{op}.plain", _PLAIN[op][1], *values)
+        special = _SINGLE if single else _DOUBLE
         if op not in special:
             raise UnsupportedError(f"{op} nodes cannot be run by LLVM")
         return self.code.apply(op, special[op], *values)
+
+    def _masked(self, masked: Masked) -> Value:
+        condition = self.truth(masked.condition)
+        value = self.code.constant(1.0, self.type) if masked.value is None else self.number(masked.value)
+        if masked.factor is not None:
+            value = value * self.number(masked.factor)
+        if masked.total is None:
+            return self.code.select(condition, value, 0.0)
+        total = self.number(masked.total)
+        return self.code.select(condition, total + value, total)
+
+    def _reads(self, node: Node) -> tuple[Node, ...]:
+        """What is read where a node is computed."""
+        return self.masked[node].reads if node in self.masked else node.arguments
+
+    def _needed(self) -> set[Node]:
+        """The nodes that are read, and those that they read."""
+        needed: set[Node] = set()
+        pending = list(self.schedule.graph.outputs)
+        while pending:
+            node = pending.pop()
+            if node not in needed:
+                needed.add(node)
+                pending += self._reads(node)
+        return needed
+
+    def _conditions_as_numbers(self) -> Iterator[Node]:
+        """The conditions that are read as numbers."""
+        for node in computed(self.body):
+            asked = {node.arguments[0]} if node.op == "select" else set()
+            if node in self.masked:
+                asked = {self.masked[node].condition}
+            if node.op not in _LOGIC:
+                yield from (read for read in self._reads(node) if is_truth(read) and read not in asked)
 
     def _numbers(self, node: Node) -> list[Value]:
         return [self.number(argument) for argument in node.arguments]
@@ -165,12 +219,25 @@ class _Body:
         """A node's value as a number."""
         if node.op == "const":
             return self.code.constant(node.detail[0], self.type)
+        if node in self.numbers:
+            return self.numbers[node]
         value = self.values[node]
         return self.code.select(value, 1.0, 0.0, self.type) if is_truth(node) else value
 
     def truth(self, node: Node) -> Value:
         """A node's value as a condition."""
         return self.values[node] if is_truth(node) else self.number(node) >= 0.5
+
+
+def _part(block: Block, nodes: Collection[Node]) -> Block:
+    """A block with these nodes alone."""
+    return tuple(
+        Branch(item.condition, _part(item.yes, nodes), _part(item.no, nodes), item.selects)
+        if isinstance(item, Branch)
+        else item
+        for item in block
+        if isinstance(item, Branch) or item in nodes
+    )
 
 
 # What operators are ------------------------------------------------------------------------------------
@@ -248,6 +315,13 @@ _SINGLE: Mapping[str, Callable[..., Value]] = {
     "atn2": functions.angle,
     "mod": functions.modulo,
 }
+
+_PLAIN: Mapping[str, tuple[Interval, Callable[[Value], Value]]] = {
+    "exp": (functions.EXP_PLAIN, functions.exp_plain),
+    "cbrt": (functions.CBRT_PLAIN, functions.cbrt_plain),
+    "sin": (functions.SIN_PLAIN, functions.sin_plain),
+}
+"""The same for operands that lie in a range."""
 
 _DOUBLE: Mapping[str, Callable[..., Value]] = {
     "exp": _library("exp"),

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from iccbrdf.calc.intervals import Interval
 from iccbrdf.calc.llvm.assembler import Value
 
 _LOG2_E = 1 / math.log(2)
@@ -22,12 +23,21 @@ _HALF_PI = tuple(map(float.fromhex, ("0x1.921fb4p+0", "0x1.4442d0p-24", "0x1.846
 _HALF_PI_HIGH = float.fromhex("0x1.921fb544p+0")
 _HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")
 
+EXP_PLAIN = Interval(-87.0, 88.0)
+CBRT_PLAIN = Interval(2.0**-100, math.inf)
+SIN_PLAIN = Interval(-1.5707, 1.5707)
+"""Where `exp_plain` and so on, which are shorter, do."""
+
 _EXP_LARGEST = float.fromhex("0x1.62e42ep6")
 """The largest float32 number whose exponential is one."""
 
 # (e^r - 1 - r) / r^2 for |r| <= ln 2 / 2
 _EXP = (0.49999994, 0.16666517, 0.041668102, 0.0083691655, 0.0013838324)
-# (sin r / r - 1) / z and (cos r - 1 + z / 2) / z^2 in z = r^2, for |r| <= pi / 4
+# ((1 - e)^(-1/3) - 1) / e for |e| <= 0.104
+_CBRT = (0.3346972, 0.22289944)
+# (sin r / r - 1) / z in z = r^2, for |r| <= pi / 2
+_SINE = (-0.1666666, 0.008333066, -0.0001980954, 2.6056311e-06)
+# The same and (cos r - 1 + z / 2) / z^2, for |r| <= pi / 4
 _SIN = (-0.16666655, 0.008332188, -0.00019518095)
 _COS = (0.041666646, -0.001388731, 2.4432327e-05)
 # (atan t / t - 1) / z in z = t^2, for |t| <= 1
@@ -51,12 +61,23 @@ def nearest(x: Value, shift: float) -> tuple[Value, Value]:
 def exp(x: Value) -> Value:
     """e^x."""
     code = x.code
-    within = code.select(x < -104.0, -104.0, x)
-    whole, n = nearest(within * _LOG2_E, 1.5 * 2**23)
-    r = code.muladd(whole, -_LN2_HIGH, within)
-    r = code.muladd(whole, -_LN2_LOW, r)
-    power = code.muladd(r * r, code.polynomial(r, _EXP), r) + 1.0
+    power, n = _power_of_e(code.select(x < -104.0, -104.0, x))
     return code.select(x <= _EXP_LARGEST, scaled(power, n), x + math.inf)
+
+
+def exp_plain(x: Value) -> Value:
+    """e^x for x in EXP_PLAIN."""
+    power, n = _power_of_e(x)
+    return _scaled_plainly(power, n)
+
+
+def _power_of_e(x: Value) -> tuple[Value, Value]:
+    """e^x / 2^n, near 1, and n."""
+    code = x.code
+    whole, n = nearest(x * _LOG2_E, 1.5 * 2**23)
+    r = code.muladd(whole, -_LN2_HIGH, x)
+    r = code.muladd(whole, -_LN2_LOW, r)
+    return code.polynomial(r, (1.0, 1.0, *_EXP)), n
 
 
 def scaled(x: Value, n: Value) -> Value:
@@ -66,7 +87,6 @@ def scaled(x: Value, n: Value) -> Value:
     made by an addition to the exponent, others in float64.
     """
     code = x.code
-    normal = code.from_bits(code.bits(x) + (n << 23), x)
     small = n < -125
 
     def subnormal() -> list[Value]:
@@ -75,28 +95,37 @@ def scaled(x: Value, n: Value) -> Value:
         return [code.narrow(wide * code.from_bits(factor, wide), x.type)]
 
     (other,) = code.where_any(small, subnormal)
-    return code.select(small, other, normal)
+    return code.select(small, other, _scaled_plainly(x, n))
+
+
+def _scaled_plainly(x: Value, n: Value) -> Value:
+    return x.code.from_bits(x.code.bits(x) + (n << 23), x)
 
 
 def cbrt(x: Value) -> Value:
-    """The cube root: y near |x|^(-1/3), made better by Householder's iteration, then x y^2, corrected."""
+    """The cube root."""
     code = x.code
     size = abs(x)
-    tiny = size < 2.0**-120
-    a = code.select(tiny, size * 2.0**24, size)
+    tiny = size < CBRT_PLAIN.low
+    root = cbrt_plain(code.select(tiny, size * 2.0**24, size))
+    return code.intrinsic("copysign", code.select(tiny, root * 2.0**-8, root), x)
+
+
+def cbrt_plain(x: Value) -> Value:
+    """The cube root of x in CBRT_PLAIN: y near x^(-1/3), better by a series, then x y^2, by Newton's step."""
+    code = x.code
     # The bits of a number are near its logarithm.
-    third = code.cast("sitofp", code.bits(a), x.type) * (1 / 3)
-    y = code.from_bits(0x54A21D2A - code.cast("fptosi", third, x.type.of("i32")), x)
-    for _ in range(2):
-        error = 1.0 - (a * y) * (y * y)
-        y = code.muladd(y * error, code.muladd(error, 2 / 9, 1 / 3), y)
+    guess = code.muladd(code.cast("sitofp", code.bits(x), x.type), -1 / 3, 0x54A2143F)
+    y = code.from_bits(code.cast("fptosi", guess, x.type.of("i32")), x)
+    error = code.muladd(-(x * y), y * y, 1.0)
+    y = code.muladd(y * error, code.polynomial(error, _CBRT), y)
     square = y * y
-    root = a * square
-    # Over 8, lest the cube overflow.
-    excess = (root * root) * (root * 0.125) - a * 0.125
-    root = root - excess * (square * (8 / 3))
-    root = code.select(tiny, root * 2.0**-8, root)
-    return code.intrinsic("copysign", code.select(size < math.inf, root, size), x)
+    root = x * square
+    # Lest the cube overflow where it is rounded.
+    part = 1.0 if code.target.fma else 0.125
+    excess = code.muladd(root * root, root * part, x * -part)
+    root = code.muladd(excess * square, -1 / (3 * part), root)
+    return code.select(x < math.inf, root, x)
 
 
 # Angles ------------------------------------------------------------------------------------------------
@@ -106,29 +135,16 @@ _MOST_TURNED = 2.0**13
 """Up to this size of an argument the number of quarter turns is right, and their sum exact enough."""
 
 
-def _turned_back(x: Value) -> tuple[Value, Value]:
-    """x less n quarter turns, of size up to pi / 4, and n as i32."""
+def _turned_back(x: Value, quarters: Value) -> Value:
+    """x less that many quarter turns."""
     code = x.code
-    whole, turns = nearest(x * (2 / math.pi), 1.5 * 2**23)
     if code.target.fma:
         for part in _HALF_PI:
-            x = code.muladd(whole, -part, x)
-        return x, turns
-    number = code.widen(whole)
+            x = code.muladd(quarters, -part, x)
+        return x
+    number = code.widen(quarters)
     rest = code.widen(x) - number * _HALF_PI_HIGH - number * _HALF_PI_LOW
-    return code.narrow(rest, x.type), turns
-
-
-def _quarter(x: Value) -> tuple[Value, Value, Value]:
-    """Sine and cosine of x less n quarter turns, and n as i32."""
-    code = x.code
-    # Nor does a subnormal argument do harm when it is 0.
-    r, turns = _turned_back(code.select(abs(x) < _TINY, 0.0, x))
-    z = r * r
-    # r (1 + ...) keeps the sign of a zero.
-    sine = r * code.muladd(z, code.polynomial(z, _SIN), 1.0)
-    cosine = code.muladd(z * z, code.polynomial(z, _COS), code.muladd(z, -0.5, 1.0))
-    return sine, cosine, turns
+    return code.narrow(rest, x.type)
 
 
 def _unless_large(x: Value, result: Value, function: str) -> Value:
@@ -140,32 +156,52 @@ def _unless_large(x: Value, result: Value, function: str) -> Value:
     return code.select(large, other, result)
 
 
+def _or_zero(x: Value) -> Value:
+    """x, or 0 where it is so small that it is its own sine and tangent: subnormal numbers take long."""
+    return x.code.select(abs(x) < _TINY, 0.0, x)
+
+
 def _unless_tiny(x: Value, result: Value) -> Value:
-    """`result`, or x where it is so small that it is its own sine and tangent."""
+    """`result`, or x where `_or_zero` has put 0 in its place."""
     return x.code.select(abs(x) < _TINY, x, result)
 
 
+def _sine(r: Value) -> Value:
+    """The sine of r, of size up to pi / 2; of a zero, a zero of any sign."""
+    z = r * r
+    return r.code.muladd(r * z, r.code.polynomial(z, _SINE), r)
+
+
 def _with_sign(x: Value, turns: Value) -> Value:
-    """-x where bit 1 of `turns` is set."""
-    code = x.code
-    return code.from_bits(code.bits(x) ^ ((turns & 2) << 30), x)
+    """-x where `turns` is odd."""
+    return x.code.from_bits(x.code.bits(x) ^ (turns << 31), x)
 
 
 def sin(x: Value) -> Value:
-    sine, cosine, turns = _quarter(x)
-    chosen = x.code.select((turns & 1).differs(0), cosine, sine)
-    return _unless_tiny(x, _unless_large(x, _with_sign(chosen, turns), "sin"))
+    whole, turns = nearest(_or_zero(x) * (1 / math.pi), 1.5 * 2**23)
+    sine = _with_sign(_sine(_turned_back(_or_zero(x), whole + whole)), turns)
+    return _unless_tiny(x, _unless_large(x, sine, "sin"))
+
+
+def sin_plain(x: Value) -> Value:
+    """The sine of x in SIN_PLAIN."""
+    return _unless_tiny(x, _sine(_or_zero(x)))
 
 
 def cos(x: Value) -> Value:
-    sine, cosine, turns = _quarter(x)
-    chosen = x.code.select((turns & 1).differs(0), sine, cosine)
-    return _unless_large(x, _with_sign(chosen, turns + 1), "cos")
+    """As the sine of what is left of x and a quarter turn."""
+    whole, turns = nearest(_or_zero(x) * (1 / math.pi) - 0.5, 1.5 * 2**23)
+    sine = _sine(_turned_back(_or_zero(x), whole + whole + 1.0))
+    return _unless_large(x, _with_sign(sine, turns + 1), "cos")
 
 
 def tan(x: Value) -> Value:
     code = x.code
-    sine, cosine, turns = _quarter(x)
+    whole, turns = nearest(_or_zero(x) * (2 / math.pi), 1.5 * 2**23)
+    r = _turned_back(_or_zero(x), whole)
+    z = r * r
+    sine = code.muladd(r * z, code.polynomial(z, _SIN), r)
+    cosine = code.muladd(z * z, code.polynomial(z, _COS), code.muladd(z, -0.5, 1.0))
     odd = (turns & 1).differs(0)
     result = code.select(odd, -cosine, sine) / code.select(odd, sine, cosine)
     return _unless_tiny(x, _unless_large(x, result, "tan"))
