@@ -87,11 +87,17 @@ class RandomGraph:
             weights = [self.op("vmax", weight, self.graph.number(1e-3)) for weight in weights]
         below = self.total(weights)
         factors = [self.graph.number(self.draw.uniform(-2, 2)) for _ in weights]
-        if self.draw.random() < 0.5:
+        if self.draw.random() < 0.6:
             products = [self.op("mul", w, c) for w, c in zip(weights, factors, strict=True)]
-            return self.op("div", self.total(products), below)
+            return self.draw.choice((self.quotient, self.by_reciprocal))(self.total(products), below)
         shares = [self.op("div", weight, below) for weight in weights]
         return self.total([self.op("mul", c, w) for w, c in zip(shares, factors, strict=True)])
+
+    def quotient(self, x, y):
+        return self.op("div", x, y)
+
+    def by_reciprocal(self, x, y):
+        return self.op("mul", x, self.op("div", self.graph.number(1.0), y))
 
     def cosine(self, x, y, z):
         one, other = self.norm(x, y, z), self.norm(y, z, x)
@@ -118,6 +124,7 @@ SHAPES = (
     lambda g, x, y, z: g.op("sqrt", g.op("vmax", x, g.graph.number(0.0))),
     lambda g, x, y, z: g.op("ln", x),
     lambda g, x, y, z: g.op("div", x, g.norm(x, y, z)),
+    lambda g, x, y, z: g.by_reciprocal(x, g.norm(x, y, z)),
     lambda g, x, y, z: g.op("div", g.square(x), g.total([g.square(x), g.square(y), g.graph.number(0.5)])),
     lambda g, x, y, z: g.op("div", x, g.op("vmax", g.op("abs", x), g.op("abs", y))),
     lambda g, x, y, z: g.op("div", g.op("abs", x), g.chain("vmin", [g.op("abs", x), g.op("abs", y), z])),
@@ -147,3 +154,20 @@ def test_random_shapes_are_contained(first, dtype):
         env = {"litX": made.draw.uniform(-1000, 1000)} if seed % 2 else {}
         pixels = samples(RANGES, 400, seed, dtype)
         assert_contained(made.graph, analysis, pixels, env, f"graph {seed}")
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_products_with_reciprocals_are_seen_as_quotients(dtype):
+    made = RandomGraph(0, dtype)
+    x, y, z = made.numbers[:3]
+    norm = made.op("sqrt", made.total([made.square(x), made.square(y), made.graph.number(1e-30)]))
+    weights = [made.op("vmax", node, made.graph.number(1e-6)) for node in (x, y, z)]
+    parts = [made.op("mul", made.graph.number(c), w) for c, w in zip((2.0, 5.0, 3.0), weights, strict=True)]
+    unit, mean = made.by_reciprocal(x, norm), made.by_reciprocal(made.total(parts), made.total(weights))
+    made.graph.outputs = (unit, mean)
+    found = analyse(made.graph, RANGES)
+    assert found.hazards == ()
+    for node, low, high in ((unit, -1, 1), (mean, 2, 5)):
+        assert low - 1e-4 < found.ranges[node].low <= low
+        assert high <= found.ranges[node].high < high + 1e-4
+    assert_contained(made.graph, found, samples(RANGES, 400, 1, dtype), {}, "reciprocals")

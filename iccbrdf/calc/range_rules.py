@@ -84,6 +84,20 @@ class Shapes:
             value = value.meet(Interval(1.0, INF))
         return self._mean(_terms(above), below, value)
 
+    def product(self, node: Node, value: Interval) -> Interval:
+        """x (1 / y) is x / y, rounded twice."""
+        for above, inverse in (node.arguments, node.arguments[::-1]):
+            if inverse.op != "div" or self.known(inverse.arguments[0]) != Interval(1.0, 1.0):
+                continue
+            below = inverse.arguments[1]
+            x, y = self.known(above), self.known(below)
+            if y.low > 0 and y.finite and x.finite:
+                if self._at_most_norm(above, below):
+                    slack = 4 * self.arithmetic.epsilon
+                    value = value.meet(Interval(-1 - slack, 1 + slack))
+                value = self._mean(_terms(above), below, value)
+        return value
+
     def _at_most_norm(self, x: Node, norm: Node) -> bool:
         """Whether `norm` is a root of a sum of squares, x^2 among them, or more than that."""
         if self.known(norm).low < math.sqrt(self.arithmetic.smallest_normal):
@@ -163,6 +177,7 @@ class Shapes:
 
 _RULES: Mapping[str, Callable[[Shapes, Node, Interval], Interval]] = {
     "div": Shapes.quotient,
+    "mul": Shapes.product,
     "add": Shapes.total,
     "sub": Shapes.difference,
     **dict.fromkeys(COMPARISONS, Shapes.comparison),
