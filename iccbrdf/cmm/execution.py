@@ -178,9 +178,12 @@ class Compiled:
         """The values of the schedule's arguments; those of the last variables are kept."""
         # 0 and -0 are equal, but are not the same light.
         key = tuple((name, float(value).hex()) for name, value in env.items())
-        if self._last[0] != key:
-            self._last = key, uniform_values(self.schedule, env)
-        return self._last[1]
+        # Threads share this object: another one may put its own variables there at any time.
+        last, arguments = self._last
+        if last != key:
+            arguments = uniform_values(self.schedule, env)
+            self._last = key, arguments
+        return arguments
 
     def bind(self, env: Mapping[str, float]) -> Run:
         finite, anything = self.runs(env)

@@ -20,8 +20,9 @@ def spread(work: Callable[[Piece], T], pieces: Iterable[Piece], threads: int) ->
     Each takes the next piece when it is done with one.  After an exception of `work`, which comes out once
     all threads are done with theirs, no piece is begun.
     """
+    pieces = tuple(pieces)
     # Iterators of tuples give each item once, whichever threads ask.
-    waiting = iter(tuple(pieces))
+    waiting = iter(pieces)
 
     def share() -> list[T]:
         try:
@@ -30,7 +31,7 @@ def spread(work: Callable[[Piece], T], pieces: Iterable[Piece], threads: int) ->
             deque(waiting, maxlen=0)
             raise
 
-    others = [_pool(threads - 1).submit(share) for _ in range(threads - 1)]
+    others = [_pool(threads - 1).submit(share) for _ in range(min(threads, len(pieces)) - 1)]
     try:
         results = share()
     finally:
