@@ -22,17 +22,20 @@ def read_whole(path: StrPath, most: int) -> bytes:
     Raises
     ------
     InputError
-        The file is missing or cannot be read.
+        The file is missing, a folder, or cannot be read.
     LimitError
         It is larger.
+    UsageError
+        `path` is no path.
     """
     try:
-        with open(path, "rb") as file:
+        # `open` alone would take an integer for an open file.
+        with Path(path).open("rb") as file:
             data = file.read(most + 1)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except (TypeError, ValueError) as error:
-        raise InputError(f"not the path of a file to read: {error}") from None
+        raise UsageError(f"not the path of a file to read: {error}") from None
     if len(data) > most:
         raise LimitError(f"{path}: larger than the limit of {most} bytes")
     return data

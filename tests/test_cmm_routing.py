@@ -242,7 +242,7 @@ def test_files(tmp_path):
         iccbrdf.link([])
     with pytest.raises(UsageError, match="found None, expected a sequence"):
         iccbrdf.link(None)
-    with pytest.raises(UsageError, match="not the path of a profile"):
+    with pytest.raises(UsageError, match="not the path of a file to read"):
         iccbrdf.link([1, 2])
 
 

@@ -182,7 +182,7 @@ def test_unreadable_files(tmp_path):
 
 @pytest.mark.parametrize("path", [None, 3, b"a.icc", "nul\0.icc"])
 def test_what_is_no_path(path):
-    with pytest.raises(UsageError, match="not the path of a profile"):
+    with pytest.raises(UsageError, match="not the path of a file to read"):
         read_profile(path)
 
 

@@ -17,7 +17,8 @@ import click
 
 from iccbrdf.cli.options import emit, json_option
 from iccbrdf.errors import nearest
-from iccbrdf.icc.profile import read_bytes
+from iccbrdf.files import read_whole
+from iccbrdf.icc.profile import MAX_BYTES
 from iccbrdf.validate import (
     CHECKS,
     RULES,
@@ -99,7 +100,7 @@ def command(
         return
     if not files:
         raise click.UsageError("no FILE to check", ctx)
-    contents = [(read_bytes(path), str(path)) for path in files]
+    contents = [(read_whole(path, MAX_BYTES), str(path)) for path in files]
     checks = CHECKS
     if ranges:
         _check_names(ranges, channels_and_variables(contents))

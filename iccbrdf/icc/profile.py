@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import struct
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
-from iccbrdf.errors import InputError, LimitError, ProfileError, UnsupportedError, UsageError, nearest
-from iccbrdf.files import atomic_output
+from iccbrdf.errors import LimitError, ProfileError, UnsupportedError, UsageError, nearest
+from iccbrdf.files import StrPath, atomic_output, read_whole
 from iccbrdf.icc.elements import MultiProcess
 from iccbrdf.icc.header import SIZE, Header, channel_count
 from iccbrdf.icc.layout import Record, shown
@@ -255,38 +253,22 @@ def compute_profile_id(data: bytes) -> bytes:
     return hashlib.md5(zeroed, usedforsecurity=False).digest()
 
 
-def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """The bytes of a profile's file, whatever they are.
-
-    Raises InputError where it is missing or cannot be read, LimitError above `MAX_BYTES`, and UsageError
-    where `path` is no path.
-    """
-    try:
-        with Path(path).open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (TypeError, ValueError) as error:
-        raise UsageError(f"not the path of a profile: {error}") from None
-    if len(data) > MAX_BYTES:
-        raise LimitError(f"{path}: larger than the limit of {MAX_BYTES} bytes")
-    return data
-
-
-def read_profile(path: str | os.PathLike[str]) -> Profile:
+def read_profile(path: StrPath) -> Profile:
     """Read a profile from a file (ICC.2, version 5; also ICC.1, versions 2 and 4).
 
     Raises
     ------
-    InputError, UsageError, LimitError
-        As `read_bytes`.
-    ProfileError, UnsupportedError, LimitError
+    InputError, UsageError
+        As `iccbrdf.files.read_whole`.
+    LimitError
+        The file is larger than `MAX_BYTES`, or as `Profile.from_bytes`.
+    ProfileError, UnsupportedError
         As `Profile.from_bytes`.
     """
-    return Profile.from_bytes(read_bytes(path), source=str(path))
+    return Profile.from_bytes(read_whole(path, MAX_BYTES), source=str(path))
 
 
-def write_profile(profile: Profile, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+def write_profile(profile: Profile, path: StrPath, *, overwrite: bool = False) -> None:
     """Write a profile to a file, which appears whole or not at all.
 
     Raises UsageError where the file exists and `overwrite` is not set, or cannot be written, or where
