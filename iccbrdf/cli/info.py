@@ -86,5 +86,3 @@ def _chain(profiles: Sequence[Path], backend: str, dtype: str) -> dict[str, Any]
         "counts": counts,
         "passes": passes,
     }
-
-

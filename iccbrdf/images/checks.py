@@ -34,6 +34,11 @@ def not_finite(data: Array) -> int:
     return data.size - int(np.count_nonzero(np.isfinite(data)))
 
 
+def not_finite_pixels(data: Array) -> int:
+    """The number of pixels, shape (height, width, channels), with a sample that is infinite or NaN."""
+    return int(np.count_nonzero(~np.isfinite(data).all(axis=2))) if not_finite(data) else 0
+
+
 def admitted(block: Block, treatment: NonFinite, label: str) -> tuple[Block, int]:
     """A block as it is to go on, and the number of its samples that are not finite.
 

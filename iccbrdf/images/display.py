@@ -13,6 +13,7 @@ import tifffile
 from iccbrdf.errors import UsageError
 from iccbrdf.files import StrPath, atomic_output
 from iccbrdf.images.blocks import Array, Assembler, Block, Coverage, Grid
+from iccbrdf.images.checks import not_finite_pixels
 from iccbrdf.images.little_cms import from_XYZ
 from iccbrdf.images.png import LONGEST_SIDE, PngWriter
 from iccbrdf.images.showing import Showing, finite, srgb
@@ -93,7 +94,7 @@ class PictureSink(ABC):
             block._replace(data=np.rint(shown.device * self._largest).astype(self._dtype)),
             above_white=int(np.count_nonzero(shown.above_white)),
             out_of_gamut=int(np.count_nonzero(shown.out_of_gamut)),
-            not_finite=int(np.count_nonzero(~np.isfinite(block.data).all(axis=2))),
+            not_finite=not_finite_pixels(block.data),
         )
 
     def put(self, levels: Levels) -> None:

@@ -6,15 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-from iccbrdf.brdf.models import NORMAL
-from iccbrdf.brdf.slopes import slope_angle
 from iccbrdf.cmm import Transform
 from iccbrdf.images import ImageSource, Place, in_order
-
-Array = npt.NDArray[np.floating[Any]]
+from iccbrdf.images.checks import not_finite_pixels, steeper
 
 FLAT, BRDF = "flat", "brdf"
 """Images that a target may take instead of a scene's."""
@@ -96,13 +90,16 @@ def run(
     def work(place: Place) -> tuple[Counts, list[Any]]:
         block = source.read(place)
         brdf = chain.to_brdf(block.data)
-        met = Counts(_not_finite(block.data), 0, _steeper(block.data, chain.last_slope))
+        met = Counts(
+            not_finite_in=not_finite_pixels(block.data),
+            beyond_slopes=steeper(block.data, source.samples, chain.to_brdf.channels_in, chain.last_slope),
+        )
         encoded: list[Any] = [None] * len(targets)
         # Scene by scene: a block of each at a time would need much memory.
         for image, numbers in takers.items():
             if isinstance(image, int):
                 data = chain.scenes[image](brdf)
-                met.not_finite_out += _not_finite(data)
+                met.not_finite_out += not_finite_pixels(data)
             else:
                 data = block.data if image == FLAT else brdf
             shown = chain.to_display(data) if any(targets[k].for_display for k in numbers) else data
@@ -122,15 +119,3 @@ def run(
             submit(work, place)
             advance(place.height * place.width)
     return counts
-
-
-def _not_finite(data: Array) -> int:
-    return int(np.count_nonzero(~np.isfinite(data).all(axis=2)))
-
-
-def _steeper(data: Array, limit: float | None) -> int:
-    """Pixels whose normal, the last three channels, leans by more than `limit` degrees."""
-    if limit is None:
-        return 0
-    # float32 normals of just that slope are not steeper.
-    return int(np.count_nonzero(slope_angle(data[..., -len(NORMAL) :]) > limit + 1e-3))
