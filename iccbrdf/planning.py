@@ -111,14 +111,12 @@ class Planning:
         """The profiles less some effects, with a note in their descriptions."""
         key = frozenset(without), note
         if key not in self._built:
-            # An angle for a term that is left out would be a contradiction.
-            recipe = replace(self.recipe, fresnel_angle=None) if "fresnel" in without else self.recipe
             colour, device = None, None
             if self.is_colour:
-                colour = recipe.colour_mid(without, reference=self._reference, device=DEVICE, note=note)
+                colour = self.recipe.colour_mid(without, reference=self._reference, device=DEVICE, note=note)
             else:
                 device = self._pair.compiled.inputs
-            self._built[key] = Built(recipe.pair(without, device=device, note=note), colour)
+            self._built[key] = Built(self.recipe.pair(without, device=device, note=note), colour)
         return self._built[key]
 
     def plan(

@@ -168,6 +168,15 @@ def test_effects_of_programs_can_be_switched():
     assert with_effects([replace(PRINT, with_source=False).pair().mvis], {"fresnel": False})[1] == set()
 
 
+def test_the_angle_of_a_fresnel_term_that_is_left_out_is_kept():
+    recipe = replace(PRINT, fresnel_angle="alpha")
+    fewer = recipe.pair(["fresnel"]).mvis
+    assert fewer.tag_data("M2B0") == PRINT.pair(["fresnel"]).mvis.tag_data("M2B0")
+    assert recipe_of_profiles([recipe.pair().mid, fewer]).fresnel_angle == "alpha"
+    (again,), _ = with_effects([fewer], {"fresnel": True})
+    assert again.tag_data("M2B0") == recipe.pair().mvis.tag_data("M2B0")
+
+
 def test_a_stale_source_switches_nothing():
     mvis, other = PRINT.pair().mvis, PRINT.pair(["shadowing"]).mvis
     stale = mvis.replace(tags={"M2B0": other["M2B0"]})

@@ -115,7 +115,6 @@ def test_fresnel_angle_alpha_is_reciprocal(run, tmp_path):
         (PRIMARIES, ["--without", "fresnell"], 2, "has no effect 'fresnell': did you mean 'fresnel'?"),
         (PRIMARIES, ["--effects", "specular,Shadowin"], 2, "did you mean 'shadowing'?"),
         (PRIMARIES, ["--effects", "specular", "--without", "fresnel"], 2, "give one of them"),
-        (PRIMARIES, ["--without", "fresnel", "--fresnel-angle", "alpha"], 2, "no Fresnel term"),
         (WARD, ["--fresnel-angle", "alpha"], 2, "isotropic Ward 2020 has no Fresnel term"),
         (PRIMARIES, ["--env", "litQ=1"], 2, "no run-time variable 'litQ': did you mean 'litZ'?"),
         (PRIMARIES, ["--light", "60"], 2, "expected ZENITH,AZIMUTH"),

@@ -76,6 +76,7 @@ def build_pair(
         Names of effects to leave out.
     fresnel_angle
         `theta_i` (as printed) or `alpha` (between half vector and view: reciprocal); default: `theta_i`.
+        Where the Fresnel term is left out, the angle that it has when it is put back.
     variables
         Values of run-time variables that hold where the CMM's environment sets none.
     device
@@ -88,8 +89,8 @@ def build_pair(
     Raises
     ------
     UsageError
-        An effect or a variable is unknown, `device` lacks a channel, or `fresnel_angle` is given and there is
-        no Fresnel term.
+        An effect or a variable is unknown, `device` lacks a channel, or `fresnel_angle` is given and the
+        model has no Fresnel term.
     """
     variables = variables or {}
     model = MODELS[primaries.model]
@@ -107,8 +108,8 @@ def build_pair(
         for name, on in chosen_effects(primaries.model, effects, without).items()
         if EFFECTS[name].program == MVIS
     }
-    if fresnel_angle is not None and not chosen.get("fresnel"):
-        raise UsageError(f"a Fresnel angle is given, but {model.title} has no Fresnel term or it is left out")
+    if fresnel_angle is not None and "fresnel" not in chosen:
+        raise UsageError(f"a Fresnel angle is given, but {model.title} has no Fresnel term")
     compiled = compile_template(
         template,
         filename=path.name,
