@@ -346,6 +346,26 @@ def test_real_samples_of_a_decoding_that_reorders():
     assert real([1, 2]).tolist() == [1, 2]
 
 
+def test_real_samples_of_a_calculator_that_decodes():
+    decode = program("in(2) in(0) 4 mul -1 add in(1) 2 add out(0,3)", 3, 3)
+    chain = [mid("abc", decode)]
+    device = iccbrdf.link(chain)
+    assert device.channels_in == ("b", "c", "a")
+    assert device([1, 2, 3]).tolist() == [3, 3, 4]
+    real = iccbrdf.link(chain, samples="real")
+    assert real.channels_in == ("a", "b", "c")
+    assert real([1, 2, 3]).tolist() == [1, 2, 3]
+    narrow = iccbrdf.link(chain, channels=["b", "a"])
+    assert narrow.channels_out == ("a", "b")
+    assert narrow([1, 2]).tolist() == [2, 3]
+
+
+@pytest.mark.parametrize("text", ["in(0,2) mul in(1) out(0,2)", "in(0) in(0) out(0,2)", "in(0) 1 out(0,2)"])
+def test_calculators_that_do_not_decode_channel_by_channel(text):
+    with pytest.raises(LinkError, match="found 'calc'"):
+        iccbrdf.link([mid("ab", program(text, 2, 2))], samples="real")
+
+
 def test_what_the_results_are():
     ends = [mid("abc"), mvis("abc"), device_profile(B2A1=scaled(1))]
     assert [iccbrdf.link(ends[: n + 1]).samples_out for n in range(3)] == ["real", "real", "device"]
@@ -354,6 +374,6 @@ def test_what_the_results_are():
 def test_real_samples_where_nothing_is_decoded():
     assert iccbrdf.link([mvis("abc")], samples="real")([1, 2, 3]).tolist() == [1, 2, 3]
     with pytest.raises(LinkError, match=r"real samples need .* decodes .* found 'calc'"):
-        iccbrdf.link([mid("a", program("in(0) out(0)", 1, 1))], samples="real")
+        iccbrdf.link([mid("a", program("in(0) copy mul out(0)", 1, 1))], samples="real")
     with pytest.raises(LinkError, match="found 'matf'"):
         iccbrdf.link([mid("ab", matrix([[1, 1], [0, 1]]))], samples="real")

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from iccbrdf.brdf.models import NORMAL
+from iccbrdf.calc.decoding import Decoding
 from iccbrdf.errors import UsageError
-from iccbrdf.icc import Matrix, Mluc, TagArray
+from iccbrdf.icc import Calculator, Matrix, Mluc, TagArray
 
 COPYRIGHT = "No copyright, use freely"
 
@@ -36,12 +37,21 @@ def ranges(channels: Sequence[str], encoding: Mapping[str, float]) -> list[Range
     return [known.get(name, (0.0, encoding.get(name.partition(".")[0], 1.0))) for name in channels]
 
 
-def decoding(channels: Sequence[str], limits: Sequence[Range], device: Sequence[str]) -> Matrix:
-    """Device values in 0..1 -> the real values of `channels`, which are among the `device` channels."""
+def decoding(channels: Sequence[str], limits: Sequence[Range], device: Sequence[str]) -> Matrix | Calculator:
+    """Device values in 0..1 -> the real values of `channels`, which are among the `device` channels.
+
+    A matrix where all device channels are taken.  A calculator where some go no further: a matrix would
+    multiply them by 0, which takes time, and makes all of a pixel NaN where one of them is not finite.
+    """
     low, high = np.array(limits, np.float32).T
-    matrix = np.zeros((len(channels), len(device)), np.float32)
-    matrix[np.arange(len(channels)), [device.index(channel) for channel in channels]] = high - low
-    return Matrix(inputs=len(device), matrix=matrix, offset=low)
+    sources = [device.index(channel) for channel in channels]
+    n, n_device = len(channels), len(device)
+    if n < n_device:
+        picked = Decoding(tuple(sources), tuple((high - low).tolist()), tuple(low.tolist()))
+        return Calculator(inputs=n_device, outputs=n, program=picked.program())
+    matrix = np.zeros((n, n_device), np.float32)
+    matrix[np.arange(n), sources] = high - low
+    return Matrix(inputs=n_device, matrix=matrix, offset=low)
 
 
 def device_channels(device: Sequence[str] | None, needed: Sequence[str]) -> tuple[str, ...]:

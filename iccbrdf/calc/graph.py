@@ -87,6 +87,8 @@ class Graph:
     """How often an operator was asked for that was there already."""
     moves: int = 0
     """Values that programs moved while they were lifted into this graph."""
+    assumes_finite: bool = False
+    """Whether something was left out that matters where an input is not finite."""
     names: dict[Node, str] = field(default_factory=dict, repr=False)
     """What sources call nodes, for people; of several names for one value the first."""
     _known: dict[tuple[Any, ...], Node] = field(default_factory=dict, repr=False)

@@ -57,7 +57,8 @@ def lift_element(
     channels
         A node for each input.
     finite_inputs
-        Whether the graph's `input` channels may be taken to be finite: 0 times one of them is 0 then.
+        Whether the graph's `input` channels may be taken to be finite: 0 times one of them is 0 then.  The
+        graph notes where that makes a difference (`assumes_finite`).
     origins
         Takes for every new node what first asked for it.
 
@@ -141,6 +142,7 @@ def _row(lift: _Lift, row: Sequence[float], channels: Sequence[Node], offset: fl
         for factor, channel in zip(row, channels, strict=True)
         if not (droppable and factor == 0 and channel.op == "input")
     ]
+    lift.graph.assumes_finite |= len(terms) < len(row)
     lift.count(len(terms))
     constant = lift.number(offset)
     if not terms:

@@ -4,37 +4,34 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from iccbrdf.cmm.spaces import single_inputs
+from iccbrdf.calc.decoding import Decoding, decoding_of
 from iccbrdf.cmm.stages import Stage
 from iccbrdf.cmm.steps import Route, Step
 from iccbrdf.errors import LinkError, nearest
-from iccbrdf.icc import Matrix, MultiProcess
+from iccbrdf.icc import Calculator, MultiProcess
 
 
 def without_decoding(stage: Stage) -> Stage:
-    """`stage` less its leading matrix: real values enter where the device values would have become real.
+    """`stage` less its decoding: real values enter where the device values would have become real.
 
     A stage that starts from no device space, or has no elements, takes real values already.  Raises LinkError
-    where the profile begins with anything else than such a matrix.
+    where the profile does not begin by decoding its channels one by one.
     """
     elements = stage.process.elements
     if stage.source.kind != "device" or not elements:
         return stage
-    inputs = single_inputs(elements[0])
-    if inputs is None:
+    decoding = decoding_of(elements[0])
+    if decoding is None:
         raise LinkError(
-            f"{stage.where}: real samples need a profile that first decodes its device channels by a matrix, "
-            f"one channel a row; found {elements[0].signature!r}"
+            f"{stage.where}: real samples need a profile that first decodes its device channels one by one, "
+            f"to a factor times the channel plus an offset; found {elements[0].signature!r}"
         )
-    own = stage.source.names
-    if len(inputs) < len(own):
+    own, sources = stage.source.names, decoding.sources
+    if len(sources) < len(own):
         # Channels that go no further are still the caller's.
-        selection = np.eye(len(own), dtype=np.float32)[list(inputs)]
-        first = Matrix(inputs=len(own), matrix=selection, offset=np.zeros(len(inputs), np.float32))
+        first = _calculator(_plain(sources), len(own))
         return replace(stage, process=replace(stage.process, elements=(first, *elements[1:])))
-    names = tuple(own[i] for i in inputs)
+    names = tuple(own[source] for source in sources)
     return replace(
         stage,
         process=MultiProcess(len(names), stage.process.outputs, elements[1:]),
@@ -66,21 +63,29 @@ def arranged(stage: Stage, names: tuple[str, ...]) -> tuple[list[Step], Stage]:
 def _narrowed(stage: Stage, kept: list[str]) -> Stage:
     """`stage` for a caller who has only the channels `kept`: the others vanish from its multiplex space."""
     own, elements = stage.source.names, stage.process.elements
-    # For each multiplex channel the one device channel that it comes from.
-    sources = single_inputs(elements[0]) if elements else tuple(range(len(own)))
-    if sources is None or len(elements) > 1 or stage.destination.kind != "mcs":
+    decoding = decoding_of(elements[0]) if elements else _plain(tuple(range(len(own))))
+    if decoding is None or len(elements) > 1 or stage.destination.kind != "mcs":
         missing = next(name for name in own if name not in kept)
         raise LinkError(f"channel {missing!r} is missing, which {stage.profile.source} needs")
-    rows = [row for row, source in enumerate(sources) if own[source] in kept]
-    columns = [own.index(name) for name in kept]
-    narrow = tuple(
-        Matrix(inputs=len(kept), matrix=e.matrix[np.ix_(rows, columns)], offset=e.offset[rows])
-        for e in elements
+    rows = [row for row, source in enumerate(decoding.sources) if own[source] in kept]
+    narrow = Decoding(
+        tuple(kept.index(own[decoding.sources[row]]) for row in rows),
+        tuple(decoding.factors[row] for row in rows),
+        tuple(decoding.offsets[row] for row in rows),
     )
     names = tuple(stage.destination.names[row] for row in rows)
     return replace(
         stage,
-        process=MultiProcess(len(kept), len(rows), narrow),
+        process=MultiProcess(len(kept), len(rows), (_calculator(narrow, len(kept)),)),
         source=replace(stage.source, names=tuple(kept)),
         destination=replace(stage.destination, names=names),
     )
+
+
+def _plain(sources: tuple[int, ...]) -> Decoding:
+    """Channels as they are."""
+    return Decoding(sources, (1.0,) * len(sources), (0.0,) * len(sources))
+
+
+def _calculator(decoding: Decoding, inputs: int) -> Calculator:
+    return Calculator(inputs=inputs, outputs=len(decoding.sources), program=decoding.program())

@@ -113,8 +113,8 @@ class Compiled:
     """The chain as one graph, compiled.
 
     `schedule` and `reports` (of the passes) tell what runs.  In NumPy, matrices leave out what is multiplied
-    by 0, which is right for finite numbers; a tile in which one is not runs in a kernel that leaves nothing
-    out, made when the first such tile is met.  In LLVM a product takes less than a look at the tile.
+    by 0, which is right for finite numbers; where some did, a tile with a number that is not finite runs in a
+    kernel that leaves nothing out, made when it is first met.  In LLVM a product takes less than such a look.
     """
 
     def __init__(
@@ -130,28 +130,26 @@ class Compiled:
         self._steps = steps
         self._channels = channels
         self._dtype = dtype
-        self._looks = backend == "numpy"
-        self.schedule, self.reports = self._lifted(finite_inputs=self._looks)
+        self.schedule, self.reports, self._looks = self._lifted(finite_inputs=backend == "numpy")
         self._finite = COMPILERS[backend](self.schedule)
         self._last: tuple[tuple[tuple[str, str], ...] | None, Sequence[np.generic]] = (None, ())
 
-    def _lifted(self, *, finite_inputs: bool) -> tuple[Schedule, tuple[Report, ...]]:
+    def _lifted(self, *, finite_inputs: bool) -> tuple[Schedule, tuple[Report, ...], bool]:
+        """What runs, how it was made, and whether it holds for finite numbers alone."""
         graph = Graph(dtype=self._dtype.type)
         nodes = [graph.input(i) for i in range(self._channels)]
         for step in self._steps:
             nodes = step.lift(graph, nodes, finite_inputs=finite_inputs)
         graph.outputs = tuple(nodes)
-        graph, reports = optimise(graph, EXACT_PASSES)
-        return schedule(graph, self._channels), reports
+        optimised, reports = optimise(graph, EXACT_PASSES)
+        return schedule(optimised, self._channels), reports, graph.assumes_finite
 
     @cached_property
     def _any(self) -> tuple[Schedule, Kernel]:
         """What runs where an input is not finite."""
         if not self._looks:
             return self.schedule, self._finite
-        plan, _ = self._lifted(finite_inputs=False)
-        if len(plan.graph.nodes) == len(self.schedule.graph.nodes):
-            return self.schedule, self._finite
+        plan, _, _ = self._lifted(finite_inputs=False)
         return plan, COMPILERS[self.backend](plan)
 
     def counts(self) -> dict[str, int]:

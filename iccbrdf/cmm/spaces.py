@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from iccbrdf.calc.decoding import decoding_of
 from iccbrdf.errors import ProfileError, UnsupportedError
 from iccbrdf.icc import ColorantTable, MultiProcess, Profile, TagArray, channel_count
 
@@ -121,25 +121,12 @@ def _colorant_names(profile: Profile, count: int) -> tuple[str, ...] | None:
 
 
 def _decoded_names(profile: Profile, count: int) -> tuple[str, ...] | None:
-    """Names of device channels by what a decoding matrix makes of them; None where that is not one to one."""
+    """Names of device channels by what they are decoded to; None where that is not one to one."""
     process = profile.get("A2M0")
     if not isinstance(process, MultiProcess) or len(process.elements) != 1:
         return None
-    inputs = single_inputs(process.elements[0])
-    if inputs is None or len(inputs) != count:
+    decoding = decoding_of(process.elements[0])
+    if decoding is None or len(decoding.sources) != count:
         return None
     names = mcs_space(profile).names
-    return tuple(names[inputs.index(i)] for i in range(count))
-
-
-def single_inputs(element: Any) -> tuple[int, ...] | None:
-    """For each row of a decoding matrix its one input, none of them twice; None for any other element.
-
-    Inputs that no row takes are device channels that go no further.
-    """
-    if element.signature != "matf" or element.matrix is None:
-        return None
-    used = [np.flatnonzero(row) for row in element.matrix]
-    if any(len(u) != 1 for u in used) or len({int(u[0]) for u in used}) != len(used):
-        return None
-    return tuple(int(u[0]) for u in used)
+    return tuple(names[decoding.sources.index(i)] for i in range(count))

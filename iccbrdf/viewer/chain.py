@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from iccbrdf.brdf.models import NORMAL
+from iccbrdf.calc.decoding import decoding_of
 from iccbrdf.calc.exact_passes import EXACT_PASSES
 from iccbrdf.calc.graph import Graph, Node
 from iccbrdf.calc.passes import neutral, optimise, uniform
@@ -145,17 +146,17 @@ def _decoding(
     bare = without_decoding(stage)
     if samples == "real" or bare is stage:
         return given, lambda pixels: pixels
-    matrix = stage.process.elements[0]
-    factor, offset = (dict(zip(bare.source.names, v.tolist(), strict=True)) for v in _rows(matrix))
-    factors = np.array([factor[name] for name in given if name in factor], np.float32)
-    offsets = np.array([offset[name] for name in given if name in factor], np.float32)
-    # A name that the profile does not have is left for `link` to complain about.
-    fits = len(factors) == len(given)
-    return given, lambda pixels: pixels * factors + offsets if fits else pixels
-
-
-def _rows(matrix: Any) -> tuple[Array, Array]:
-    return matrix.matrix.sum(axis=1), matrix.offset
+    decoding = decoding_of(stage.process.elements[0])
+    if decoding is None or not set(given) <= set(own):
+        # A name that the profile does not have is left for `link` to complain about.
+        return given, lambda pixels: pixels
+    # Channels that go no further stay as they are.
+    factors, offsets = np.ones(len(own), np.float32), np.zeros(len(own), np.float32)
+    sources = list(decoding.sources)
+    factors[sources], offsets[sources] = decoding.factors, decoding.offsets
+    order = [own.index(name) for name in given]
+    factors, offsets = factors[order], offsets[order]
+    return given, lambda pixels: pixels * factors + offsets
 
 
 # Graphs ------------------------------------------------------------------------------------------------
