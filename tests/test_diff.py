@@ -1,5 +1,6 @@
 """iccbrdf diff: what must change for one profile to become another."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from iccbrdf.cmm.agreement import agreement
 from iccbrdf.errors import LinkError
 from iccbrdf.icc import (
     Clut,
+    CompressedUtf8,
     CurveSet,
     FormulaSegment,
     Matrix,
@@ -122,6 +124,42 @@ def test_bytes_of_unknown_types():
     first, second = (sound_mid(zzzz=Unknown("zzzz", bytes(4), data)) for data in (b"abcd", b"abxdef"))
     found = only(first, second)
     assert (found.place, found.message) == ("tag zzzz, data", "4 -> 6 bytes, alike up to byte 2")
+
+
+def test_compressed_texts_by_lines():
+    first, second = (sound_mid(zzzz=CompressedUtf8.of(text)) for text in ("a\nb\nc\n", "a\nB\nc\n"))
+    found = only(first, second)
+    assert (found.place, found.message) == ("tag zzzz", "3 -> 3 lines")
+    assert found.lines[2:] == ("@@ -1,3 +1,3 @@", " a", "-b", "+B", " c")
+
+
+def test_compressed_json_by_keys():
+    def source(**recipe):
+        return sound_mid(bsrc=CompressedUtf8.of(json.dumps({"recipe": recipe, "same": [1, {"a": None}]})))
+
+    nodes = [{"name": "Cyan", "XYZ": [0.1, 0.2, 0.3]}, {"name": "Red", "XYZ": [0.3, 0.2, 0.1]}]
+    first = source(index=1.5, without=[], table=[[1, 2], [3, 4]], nodes=nodes, gone=True)
+    nodes = [nodes[0], {"name": "Red", "XYZ": [0.3, 0.25, 0.1]}, {"name": "Blue"}]
+    second = source(index=1.6, without=["gloss"], table=[[1, 2], [3.5, 4]], nodes=nodes, new={})
+    assert [(d.place, d.change, d.message) for d in differences(first, second)] == [
+        ("tag bsrc, recipe, index", "changed", "1.5 -> 1.6"),
+        ("tag bsrc, recipe, without", "changed", "[] -> ['gloss']"),
+        ("tag bsrc, recipe, table", "changed", "1 of 4 numbers differ, by at most 0.5"),
+        (
+            "tag bsrc, recipe, nodes[1], XYZ",
+            "changed",
+            "[0.3, 0.2, 0.1] -> [0.3, 0.25, 0.1], 1 of 3 numbers differ, by at most 0.05",
+        ),
+        ("tag bsrc, recipe, nodes[2]", "added", "{'name': 'Blue'}"),
+        ("tag bsrc, recipe, gone", "removed", "True"),
+        ("tag bsrc, recipe, new", "added", "{}"),
+    ]
+
+
+@pytest.mark.parametrize("data", [b"no zlib", CompressedUtf8.of("[" * 100_000).data])
+def test_compressed_texts_that_cannot_be_read(data):
+    found = only(sound_mid(bsrc=CompressedUtf8.of("{}")), sound_mid(bsrc=CompressedUtf8(data)))
+    assert found.place == "tag bsrc"
 
 
 def test_programs():

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import json
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Literal
 
@@ -13,11 +14,14 @@ import numpy as np
 from iccbrdf.calc.program import Op, Program
 from iccbrdf.errors import IccBrdfError
 from iccbrdf.icc.layout import shown
+from iccbrdf.icc.packed import CompressedUtf8
 from iccbrdf.icc.profile import Profile
 from iccbrdf.icc.text import Listing
 
 MAX_LINES = 5000
-"""Programs with longer listings are compared by their operators alone: a line diff takes quadratic time."""
+"""Programs and texts of more lines are not compared by these: a line diff takes quadratic time."""
+MAX_TEXT = 1 << 17
+"""Bytes of a compressed text; longer ones are compared as they are."""
 
 _COMPUTED = ("size", "profile_id")
 """Header fields that follow from the rest of the file."""
@@ -27,7 +31,7 @@ _LONGEST = 60
 
 @dataclass(frozen=True)
 class Difference:
-    """`message` says it in a line, `data` is for JSON, `lines` are a unified diff of programs."""
+    """`message` says it in a line, `data` is for JSON, `lines` are a unified diff of programs or texts."""
 
     place: str
     change: Literal["added", "removed", "changed"]
@@ -44,8 +48,9 @@ def compare(a: Profile, b: Profile, *, listing: Listing) -> list[Difference]:
     """What must change for `a` to become `b`: header fields, tags, and what is inside of tags.
 
     Size and profile ID, which follow from the rest, the order of the tags and the bytes between them do
-    not count.  Programs are compared by the lines of `listing`.  A tag that cannot be decoded on
-    either side is compared by its bytes.
+    not count.  Programs are compared by the lines of `listing`, compressed texts by keys where they are JSON
+    (as the source of a profile is) and else by lines.  A tag that cannot be decoded on either side is
+    compared by its bytes.
     """
     return list(_Comparison(listing).profiles(a, b))
 
@@ -85,6 +90,8 @@ class _Comparison:
             yield from self.tuples(a, b, place)
         elif isinstance(a, bytes):
             yield from _bytes(a, b, place)
+        elif isinstance(a, CompressedUtf8):
+            yield from self.texts(a, b, place)
         elif is_dataclass(a):
             for name in (f.name for f in fields(a)):
                 yield from self.values(getattr(a, name), getattr(b, name), f"{place}, {name}")
@@ -112,6 +119,35 @@ class _Comparison:
             else:
                 yield from self.values(a[index], b[index], f"{here}{_named(a[index])}")
 
+    def texts(self, a: CompressedUtf8, b: CompressedUtf8, place: str) -> Iterator[Difference]:
+        """What the texts say, however they are compressed."""
+        try:
+            first, second = a.unpacked(MAX_TEXT), b.unpacked(MAX_TEXT)
+        except IccBrdfError:
+            yield from _bytes(a.data, b.data, place)
+            return
+        try:
+            found = list(self.plain(json.loads(first), json.loads(second), place))
+        except (ValueError, RecursionError):
+            found = list(_texts(first.splitlines(), second.splitlines(), place))
+        yield from found
+
+    def plain(self, a: Any, b: Any, place: str) -> Iterator[Difference]:
+        """Values of JSON."""
+        before, after = _parts(a), _parts(b)
+        if before and after:
+            for part in dict.fromkeys([*before, *after]):
+                if part not in after:
+                    yield Difference(place + part, "removed", _short(before[part]))
+                elif part not in before:
+                    yield Difference(place + part, "added", _short(after[part]))
+                else:
+                    yield from self.plain(before[part], after[part], place + part)
+        elif not (isinstance(a, list) and isinstance(b, list)):
+            yield from self.values(a, b, place)
+        elif a != b:
+            yield from _lists(a, b, place)
+
     def programs(self, a: Program, b: Program, place: str) -> Difference:
         before, after = (Counter(op.name for op in program) for program in (a, b))
         changed = {name: [before[name], after[name]] for name in sorted(before | after)}
@@ -125,12 +161,54 @@ class _Comparison:
     def diff(self, a: Program, b: Program) -> tuple[str, ...]:
         """A unified diff of the listings; nothing where one of them cannot be listed or is too long."""
         try:
-            first, second = (self.listing(program).splitlines() for program in (a, b))
+            return _diff(*(self.listing(program).splitlines() for program in (a, b)))
         except IccBrdfError:
             return ()
-        if max(len(first), len(second)) > MAX_LINES:
-            return ()
-        return tuple(difflib.unified_diff(first, second, "a", "b", lineterm="", n=2))
+
+
+def _diff(a: Sequence[str], b: Sequence[str]) -> tuple[str, ...]:
+    if max(len(a), len(b)) > MAX_LINES:
+        return ()
+    return tuple(difflib.unified_diff(a, b, "a", "b", lineterm="", n=2))
+
+
+def _parts(value: Any) -> dict[str, Any]:
+    """What an object of JSON or a list of objects consists of, by the place in it; nothing for others."""
+    if isinstance(value, dict):
+        return {f", {key}": item for key, item in value.items()}
+    if isinstance(value, list) and all(isinstance(item, dict) for item in value):
+        return {f"[{index}]": item for index, item in enumerate(value)}
+    return {}
+
+
+def _texts(a: Sequence[str], b: Sequence[str], place: str) -> Iterator[Difference]:
+    if a != b:
+        yield Difference(place, "changed", f"{len(a)} -> {len(b)} lines", lines=_diff(a, b))
+
+
+def _lists(a: list[Any], b: list[Any], place: str) -> Iterator[Difference]:
+    """Lists of JSON that differ: tables of numbers as such, short lists as they are, others by items."""
+    first, second = _table(a), _table(b)
+    both = f"{_short(a)} -> {_short(b)}"
+    if first is not None and second is not None:
+        yield from _arrays(first, second, place, text="" if first.ndim > 1 else f"{both}, ")
+    elif max(len(repr(a)), len(repr(b))) <= _LONGEST:
+        yield Difference(place, "changed", both, {"a": a, "b": b})
+    else:
+        yield from _texts(_lines(a), _lines(b), place)
+
+
+def _lines(items: list[Any]) -> list[str]:
+    return [item if isinstance(item, str) else repr(item) for item in items]
+
+
+def _table(items: list[Any]) -> Any:
+    """The array of a list of numbers, or of rows of as many numbers; None for any other."""
+    try:
+        array = np.array(items)
+    except ValueError:  # rows of different lengths
+        return None
+    return array if array.dtype.kind in "if" else None
 
 
 def _arrays(a: Any, b: Any, place: str, *, text: str = "") -> Iterator[Difference]:
