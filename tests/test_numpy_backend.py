@@ -15,6 +15,7 @@ from iccbrdf.calc import numpy_functions
 from iccbrdf.calc.buffers import Code, allocate
 from iccbrdf.calc.graph import LOGIC, TRUTHS, Graph
 from iccbrdf.calc.numpy_backend import compile_numpy
+from iccbrdf.calc.numpy_lowering import lower
 from iccbrdf.calc.operators import OPERATORS
 from iccbrdf.calc.program import parse
 from iccbrdf.calc.schedule import Branch, Schedule, schedule, uniform_values
@@ -290,6 +291,32 @@ def test_a_chain_needs_one_buffer():
     for _ in range(5):
         value = code.do(np.sqrt, value)
     assert allocate(code.steps).numbers == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "outputs", "buffers", "steps"),
+    [
+        ("in(0) out(0)", 1, 0, 1),
+        ("in(1,2) out(0,2) in(0) out(2)", 3, 0, 3),
+        ("in(0) 3 mul out(0)", 1, 0, 1),
+        ("2 in(0) sub out(0)", 1, 0, 1),
+        ("env(litX) pop 1 add in(0) mul out(0)", 1, 0, 1),
+        # More than one function, more than one reader, or more than one channel.
+        ("in(0) 3 mul 1 add out(0)", 1, 1, 4),
+        ("in(0) copy mul out(0)", 1, 1, 3),
+        ("in(0) 3 mul copy out(0,2)", 2, 1, 4),
+        ("in(0) 3 mul out(0) in(0) out(1)", 2, 2, 4),
+        ("in(0) in(1) mul out(0)", 1, 2, 4),
+        ("in(0) 1 gt out(0)", 1, 1, 4),
+    ],
+)
+def test_channels_that_go_straight_through_take_no_buffer(text, outputs, buffers, steps):
+    element = calculator(parse(text), 3, outputs)
+    plan = scheduled(element)
+    code = lower(plan)
+    assert (allocate(code).numbers, len(code)) == (buffers, steps)
+    pixels, env = hard_pixels(500, 3), {"litX": 0.75}
+    assert same_bits(run(plan, pixels, env), interpreted(element, pixels, env))
 
 
 def test_buffers_are_not_given_away_while_they_are_needed():

@@ -8,6 +8,7 @@ few buffers that these can share, from when each is needed for the last time.
 from __future__ import annotations
 
 import enum
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -135,6 +136,45 @@ class Code:
         write()
         block, self.steps = self.steps, outer
         return block
+
+
+def direct(steps: Steps) -> Steps:
+    """
+    The same code, but for channels that go out after one function at most: these take no buffer on the way.
+
+    Channels are not contiguous, and functions slower on them: copying to a buffer and back takes longer than
+    that for one function, but not for two.
+    """
+    reads = Counter(register for read, _ in _uses(steps) for register in read)
+    sources = {
+        step.writes[0]: step
+        for step in steps
+        if isinstance(step, Step) and len(step.writes) == 1 and reads[step.writes[0].register] == 1
+    }
+
+    def source(step: Step) -> Step | None:
+        """What makes the only thing that a step reads from a buffer, and that nothing else reads."""
+        read = [operand for operand in step.reads if isinstance(operand, Place) and operand in sources]
+        return sources[read[0]] if len(read) == len(_buffered(step.reads)) == 1 else None
+
+    shorter: dict[int, Step] = {}
+    spared: set[int] = set()
+    for last in steps:
+        if not isinstance(last, Step) or last.writes[0].register.kind is not Kind.OUTPUT:
+            continue
+        middle = source(last)
+        if middle is None:
+            continue
+        first = source(middle)
+        path = [middle] if first is None else [middle, first]
+        (channel, *others) = path[-1].reads
+        if others or not isinstance(channel, Place) or channel.register.kind is not Kind.INPUT:
+            continue
+        function = middle if first is not None else last
+        through = tuple(channel if operand in sources else operand for operand in function.reads)
+        shorter[id(last)] = Step(function.function, through, last.writes)
+        spared.update(map(id, path))
+    return [shorter.get(id(step), step) for step in steps if id(step) not in spared]
 
 
 # Sharing buffers ---------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from iccbrdf.calc import elements
-from iccbrdf.calc.buffers import Code, Fork, Kind, Operand, Place, Register, Step, Steps, View
+from iccbrdf.calc.buffers import Code, Fork, Kind, Operand, Place, Register, Step, Steps, View, direct
 from iccbrdf.calc.graph import Node, is_truth
 from iccbrdf.calc.meanings import solve
 from iccbrdf.calc.numpy_functions import LOGIC, MADE, NUMBERS, TESTS, copy, select, widened
@@ -29,7 +29,7 @@ def lower(plan: Schedule) -> Steps:
     lowering = _Lowering(plan)
     lowering.block(plan.body)
     lowering.outputs(plan.graph.outputs)
-    return lowering.code.steps
+    return direct(lowering.code.steps)
 
 
 class _Lowering:
