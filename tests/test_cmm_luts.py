@@ -114,12 +114,6 @@ def test_what_has_no_meaning():
         iccbrdf.link([device_profile(A2B1=PlainText("a"))])
 
 
-@pytest.mark.parametrize("device_class", ["nmcl", "cenc"])
-def test_classes_without_transforms(device_class):
-    with pytest.raises(UnsupportedError, match=f"class '{device_class}', .* has no transform of pixels"):
-        iccbrdf.link([device_profile(device_class)])
-
-
 CORNERS = RNG.uniform(0, 1, (2, 2, 2, 3)).astype(np.float32)
 
 

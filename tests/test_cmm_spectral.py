@@ -312,7 +312,7 @@ def test_spectra_that_do_not_link():
     with pytest.raises(LinkError, match=r"spectral connection space es0051 .* takes spectral connection"):
         iccbrdf.link([spectral("es0051"), prints])
     with pytest.raises(LinkError, match="links with none: expected spectra of reflection"):
-        iccbrdf.link([spectral("bs0051"), to_device()])
+        iccbrdf.link([spectral("sm0051"), to_device()])
     colours = scanner(EmissionMatrix(RANGE, WHITE, LIGHTS, 0 * WHITE))
     with pytest.raises(LinkError, match=r"ends on connection space XYZ .* starts from spectral"):
         iccbrdf.link([colours, prints])

@@ -25,12 +25,13 @@ _KINDS = {
     "mcs": "multiplex space",
     "pcs": "connection space",
     "spectral": "spectral connection space",
+    "named": "named colours",
 }
 
 
 @dataclass(frozen=True)
 class Space:
-    """`kind` is device, mcs, pcs or spectral; `signature` the header's four characters (or as nc000a)."""
+    """`kind` is device, mcs, pcs, spectral or named; `signature` the header's characters (or nc000a)."""
 
     kind: str
     signature: str

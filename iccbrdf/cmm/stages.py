@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from iccbrdf.cmm.luts import TYPES, as_elements
+from iccbrdf.cmm.named import named_step
+from iccbrdf.cmm.ramps import NAMED
 from iccbrdf.cmm.resolve import Resolver, holds_spectra
 from iccbrdf.cmm.shapers import SHAPERS, shaper
 from iccbrdf.cmm.spaces import Space, device_space, mcs_space, pcs_space, spectral_space
@@ -22,8 +24,6 @@ INTENTS = ("perceptual", "relative", "saturation", "absolute")
 # the specification and is warned about.
 _PREFERENCE = {0: (0, 1, 3, 2), 1: (1, 3, 0, 2), 2: (2, 0, 1, 3), 3: (3, 1, 0, 2)}
 _BY_THE_BOOK = {0: (0,), 1: (1, 3, 0), 2: (2, 0), 3: (3, 1, 0)}
-
-_NO_PIXELS = {"nmcl": "named colours", "cenc": "a colour encoding"}
 
 _CANNOT_RUN = ("M2S", "D2B", "B2D", *(f"{kind}{way}" for kind in "bd" for way in ("AB", "BA", "DB", "BD")),
                "bMB", "bMS", "bcp", "bsp")  # fmt: skip
@@ -48,6 +48,8 @@ class Stage:
     Spectra before spectral elements bind these late: both profiles of such a pair are seen under the first
     one's conditions, and nothing is converted between them.
     """
+    named: Process | None = None
+    """What runs instead of elements, of which `process` has none then: named colours."""
 
     @property
     def where(self) -> str:
@@ -66,7 +68,7 @@ class Stage:
             return None
         if self.tag[-1] == "3":
             return "absolute"
-        classic = self.profile.header.version[0] < 5 or self.tag in SHAPERS
+        classic = self.profile.header.version[0] < 5 or self.tag in (*SHAPERS, *NAMED)
         return "relative" if classic or self.tag[-1] == "1" else None
 
     @property
@@ -76,7 +78,7 @@ class Stage:
         return (
             self.intent == "perceptual"
             and header.device_class != "abst"
-            and (header.version[0] < 4 or self.tag in SHAPERS)
+            and (header.version[0] < 4 or self.tag in (*SHAPERS, *NAMED))
         )
 
     @property
@@ -86,7 +88,7 @@ class Stage:
 
     def step(self, interpolation: str) -> Process:
         """The tag as a step that is safe to run."""
-        return Process.checked(self.process, self.where, Resolver(self.viewing, interpolation))
+        return self.named or Process.checked(self.process, self.where, Resolver(self.viewing, interpolation))
 
 
 def stages(
@@ -123,11 +125,11 @@ def stages(
 def _stage(profile: Profile, before: Space | None, following: str, asked: str, spectral: bool) -> Stage:
     """The transform that `profile` contributes between the space before it and the profile after it."""
     device_class, intent = profile.header.device_class, INTENTS.index(asked)
-    if device_class in _NO_PIXELS:
-        raise UnsupportedError(
-            f"{profile.source}: class {device_class!r}, {_NO_PIXELS[device_class]}, "
-            "has no transform of pixels"
-        )
+    if device_class == "nmcl":
+        tag = next((tag for tag in NAMED if tag in profile), NAMED[0])
+        step, source, destination = named_step(profile, before, spectral=spectral)
+        process = MultiProcess(len(source.names), len(source.names), ())
+        return Stage(profile, asked, tag, process, source, destination, profile, profile, step)
     to_mcs = profile.header.mcs and "A2M0" in profile and following in ("mvis", "mlnk")
     if device_class == "mid " or to_mcs:
         tag, source, destination = "A2M0", device_space(profile), mcs_space(profile)
