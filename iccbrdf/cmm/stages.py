@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from iccbrdf.cmm.encodings import as_display
 from iccbrdf.cmm.luts import TYPES, as_elements
 from iccbrdf.cmm.named import named_step
 from iccbrdf.cmm.ramps import NAMED
@@ -105,6 +106,7 @@ def stages(
     stand in for those of the profile there.
     """
     intents = [intent] * len(chain) if isinstance(intent, str) else intent
+    chain = [as_display(profile) if profile.header.device_class == "cenc" else profile for profile in chain]
     found: list[Stage] = []
     for i, profile in enumerate(chain):
         if found and not profile.header.extended_range:
