@@ -15,6 +15,8 @@ from conftest import ROOT
 from proof_examples import PRIMARIES, bump, nodes, write_height, write_lab
 
 import iccbrdf
+from iccbrdf.brdf.primaries import read_primaries
+from iccbrdf.build import build_pair
 from iccbrdf.calc.graph import Graph
 from iccbrdf.calc.schedule import schedule
 from iccbrdf.errors import InputError, UnsupportedError, UsageError
@@ -202,6 +204,15 @@ def test_device_values_are_decoded_before_the_page(image):
     with open_tiff(image) as source:
         (block,) = source.blocks()
     assert chain.convert(block.data) == pytest.approx(mid(block.data), rel=1e-6, abs=1e-6)
+
+
+def test_channels_that_a_reduced_mid_does_not_take():
+    pair = build_pair(read_primaries(PRIMARIES), without=["specular"], device=NAMES)
+    chain = whole_chain([pair.mid, pair.mvis], None, "device", {})
+    pixels = np.random.default_rng(1).random((20, 10)).astype(np.float32)
+    real = iccbrdf.link([pair.mid, pair.mvis], samples="real", channels=NAMES)
+    device = iccbrdf.link([pair.mid, pair.mvis], channels=NAMES)
+    assert real(chain.convert(pixels)) == pytest.approx(device(pixels), rel=1e-6)
 
 
 def test_a_mid_with_tables_is_run_now(tmp_path):
