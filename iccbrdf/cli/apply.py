@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,6 +11,7 @@ from iccbrdf import images
 from iccbrdf.build import image_link, last_slope
 from iccbrdf.cli.options import (
     backend_option,
+    chain_options,
     emit,
     environment,
     force_option,
@@ -28,9 +28,9 @@ from iccbrdf.cli.pipeline import (
     run,
     run_on_cluster,
 )
-from iccbrdf.cmm import INTENTS, MAX_COST, link
+from iccbrdf.cmm import MAX_COST, link
 from iccbrdf.cmm.effects import SUBSTITUTES
-from iccbrdf.errors import UsageError, nearest
+from iccbrdf.errors import UsageError
 from iccbrdf.icc import Profile, read_profile
 from iccbrdf.images import ImageSource, Samples, WithNormals, processors
 from iccbrdf.images.blocks import Array
@@ -109,26 +109,6 @@ def _recompiled(
     return chain, rest, [name for name in without if name not in known]
 
 
-def _intents(_context: click.Context, _option: click.Parameter, text: str) -> str | list[str]:
-    """What --intent asks for, as `link` takes it."""
-    names = name_list(text)
-    for name in names:
-        if name not in INTENTS:
-            raise click.BadParameter(f"{name!r} is unknown: {nearest(name, INTENTS)}")
-    return names[0] if len(names) == 1 else names
-
-
-def _conditions(items: Sequence[str]) -> dict[int, Path]:
-    """Profiles by the position, from 0, of those for whose viewing conditions theirs stand in."""
-    found = {}
-    for item in items:
-        place, equals, path = item.partition("=")
-        if not equals or not place.isdecimal() or int(place) == 0:
-            raise UsageError(f"--conditions {item!r}: expected PLACE=PROFILE, such as 2=d65.icc")
-        found[int(place) - 1] = Path(path)
-    return found
-
-
 @click.command("apply", epilog=EPILOG)
 @click.argument("image", type=click.Path(path_type=Path))
 @click.option("-p", "--profile", "profiles", multiple=True, required=True, type=click.Path(path_type=Path),
@@ -146,11 +126,7 @@ def _conditions(items: Sequence[str]) -> dict[int, Path]:
               help="Effects to leave out: of these four and, where a profile holds its source, fresnel, "
               "shadowing, below-horizon and highlight-range, which --effects puts back.")  # fmt: skip
 @backend_option
-@click.option("--intent", metavar="NAMES", default="relative", show_default=True, callback=_intents,
-              help=f"{', '.join(INTENTS)}; or one for each profile, separated by commas.")  # fmt: skip
-@click.option("--conditions", multiple=True, metavar="PLACE=PROFILE",
-              help="A profile whose viewing conditions stand in for those of the one at this place of the "
-              "chain, from 1; repeatable.")  # fmt: skip
+@chain_options
 @click.option("--samples", type=click.Choice(("device", "real")),
               help="What a float image holds, where it does not say so itself: device values 0..1, or real "
               "ones (signed normals, physical parameters).")  # fmt: skip
@@ -201,7 +177,7 @@ def command(
     left_out: str | None,
     backend: str,
     intent: str | list[str],
-    conditions: tuple[str, ...],
+    conditions: dict[int, Path],
     samples: Samples | None,
     channels: str | None,
     normal_map: Path | None,
@@ -228,7 +204,6 @@ def command(
     of `iccbrdf build` the BRDF parameters and the normal, for a colour MID XYZ and the normal.  A colour MID
     alone writes the BRDF image, encoded for the binding MID.
     """
-    stated = _conditions(conditions)
     wanted, gone = _effects(effects, left_out), _names(left_out or "")
     chain, kept, omitted = _recompiled([read_profile(path) for path in profiles], wanted, gone)
     last = chain[-1]
@@ -257,7 +232,7 @@ def command(
             source, declared = WithNormals(opened, own, normals), None
         settings: dict[str, Any] = {
             "intent": intent,
-            "conditions": stated,
+            "conditions": conditions,
             "dtype": "float64" if double else "float32",
             "samples": source.samples,
             "backend": backend,

@@ -15,7 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from iccbrdf.errors import InputError, LimitError, ProfileError
-from iccbrdf.icc import NamedColours, NumberArray, Profile, SparseMatrixArray, TagArray, TagStruct, Utf8
+from iccbrdf.icc import (
+    NamedColours,
+    NumberArray,
+    Profile,
+    SparseMatrix,
+    SparseMatrixArray,
+    TagArray,
+    TagStruct,
+    Utf8,
+)
 
 NAMED = ("ncl2", "nmcl")
 """Tags that hold named colours."""
@@ -25,12 +34,8 @@ MAX_NUMBERS = 1 << 24
 
 _ARRAYS = ("nmcl", "ncol")
 
-Member = Literal["pcs ", "spec", "dev "]
-_WHAT: Mapping[Member, str] = {
-    "pcs ": "connection space values",
-    "spec": "spectrum",
-    "dev ": "device values",
-}
+Member = Literal["pcs ", "spec"]
+_WHAT: Mapping[Member, str] = {"pcs ": "connection space colours", "spec": "spectra"}
 
 Array = npt.NDArray[np.float64]
 
@@ -78,25 +83,31 @@ def named_colours(profile: Profile) -> tuple[str, ...]:
 
 
 def ramps(profile: Profile, member: Member, channels: int) -> tuple[Ramp, ...]:
-    """The colours of a profile: their values in the connection space, their spectra, or their device values.
+    """The colours of a profile: their values in the connection space, of so many channels, or their spectra.
 
-    Raises ProfileError where they are malformed, LimitError beyond `MAX_NUMBERS`.
+    Those of a namedColor2Type have no spectra.  Raises ProfileError where they are malformed or there are
+    none, LimitError beyond `MAX_NUMBERS`.
     """
+    place = f"{profile.source}: named colours"
     table = _table(profile)
     if isinstance(table, NamedColours):
-        return _plain_ramps(profile, table, member)
-    place = f"{profile.source}: named colours"
+        found = _plain_ramps(profile, table)
+    else:
+        found = _tinted_ramps(profile, table, member, channels, place)
+    if not any(len(ramp.tints) for ramp in found):
+        raise ProfileError(f"{place}: found no {_WHAT[member]} for any of them")
+    return found
+
+
+def _tinted_ramps(
+    profile: Profile, table: TagArray, member: Member, channels: int, place: str
+) -> tuple[Ramp, ...]:
     zero, colours = _structures(profile, table)
-    lightest = _rows(zero.get(member), channels, f"{place}: zero tint, {_WHAT[member]}")
-    found: list[Ramp] = []
-    room = MAX_NUMBERS
-    for colour in colours:
-        name = _name(colour)
-        room -= max(1, _size(colour.get(member), channels))
-        if room < 0:
-            raise LimitError(f"{place}: more than {MAX_NUMBERS} numbers for their {_WHAT[member]}")
-        found.append(_ramp(colour, member, channels, lightest, f"{place}: {name!r}"))
-    return tuple(found)
+    if sum(channels + _size(each.get(member), channels) for each in (zero, *colours)) > MAX_NUMBERS:
+        raise LimitError(f"{place}: more than {MAX_NUMBERS} numbers for their {_WHAT[member]}")
+    shape = channels, profile.header.spectral_steps
+    lightest = _rows(zero.get(member), shape, f"{place}: zero tint, {_WHAT[member]}")
+    return tuple(_ramp(colour, member, shape, lightest, place) for colour in colours)
 
 
 def has_tints(profile: Profile) -> bool:
@@ -144,16 +155,22 @@ def _size(value: Any, channels: int) -> int:
     return len(value.values) if isinstance(value, NumberArray) else 0
 
 
-def _rows(value: Any, channels: int, place: str) -> Array:
-    """Values of shape (n, channels), those of matrices row by row; n = 0 where there are none."""
+def _rows(value: Any, shape: tuple[int, int], place: str) -> Array:
+    """Values of shape (n, channels), n = 0 where there are none.
+
+    shape: the channels, and how many rows they are of a matrix, which comes row by row.
+    """
+    channels, steps = shape
     if value is None:
         return np.empty((0, channels))
     if isinstance(value, SparseMatrixArray):
-        numbers = [np.zeros(0), *(_dense(matrix) for matrix in value.matrices if _fits(matrix, channels))]
-        flat = np.concatenate(numbers)
-        if len(flat) == channels * len(value.matrices) > 0:
-            return flat.reshape(-1, channels)
-        raise ProfileError(f"{place}: expected matrices of {channels} numbers, one or more")
+        for matrix in value.matrices:
+            if matrix.rows != steps or matrix.rows * matrix.columns != channels:
+                raise ProfileError(
+                    f"{place}: found a matrix of {matrix.rows} by {matrix.columns} numbers, "
+                    f"expected {steps} rows, {channels} numbers"
+                )
+        return np.stack([np.zeros(channels), *map(_dense, value.matrices)])[1:]
     if not isinstance(value, NumberArray):
         raise ProfileError(f"{place}: found type {value.signature!r}, expected numbers")
     flat = value.normalised()
@@ -162,44 +179,42 @@ def _rows(value: Any, channels: int, place: str) -> Array:
     return flat.reshape(-1, channels)
 
 
-def _fits(matrix: Any, channels: int) -> bool:
-    return bool(matrix.rows * matrix.columns == channels)
-
-
-def _dense(matrix: Any) -> Array:
+def _dense(matrix: SparseMatrix) -> Array:
     numbers = np.zeros((matrix.rows, matrix.columns))
     numbers[np.repeat(np.arange(matrix.rows), np.diff(matrix.starts)), matrix.indices] = matrix.values
     return numbers.reshape(-1)
 
 
-def _ramp(colour: TagStruct, member: Member, channels: int, lightest: Array, place: str) -> Ramp:
-    values = _rows(colour.get(member), channels, f"{place}, {_WHAT[member]}")
+def _ramp(colour: TagStruct, member: Member, shape: tuple[int, int], lightest: Array, table: str) -> Ramp:
+    name = _name(colour)
+    place = f"{table}: {name!r}"
+    values = _rows(colour.get(member), shape, f"{place}, {_WHAT[member]}")
+    if not len(values):
+        return Ramp(name, np.zeros(0), values)
     told = colour.get("tint")
     if told is None:
         # In equal steps up to full strength.
-        tints = np.arange(1, len(values) + 1) / max(len(values), 1)
+        tints = np.arange(1, len(values) + 1) / len(values)
     elif isinstance(told, NumberArray):
         tints = told.normalised()
     else:
         raise ProfileError(f"{place}, tints: found type {told.signature!r}, expected numbers")
-    if not len(values):
-        return Ramp(_name(colour), np.zeros(0), values)
     if len(tints) != len(values):
         raise ProfileError(f"{place}: found {len(tints)} tints for {len(values)} {_WHAT[member]}")
     if not (tints[0] >= 0 and tints[-1] <= 1 and (np.diff(tints) > 0).all()):
         raise ProfileError(f"{place}, tints: found {tints}, expected numbers that increase within 0..1")
     if tints[0] > 0 and len(lightest) == 1:
         tints, values = np.concatenate([[0.0], tints]), np.concatenate([lightest, values])
-    return Ramp(_name(colour), tints, values)
+    return Ramp(name, tints, values)
 
 
-def _plain_ramps(profile: Profile, table: NamedColours, member: Member) -> tuple[Ramp, ...]:
-    full = np.ones(1)
-    if member == "dev ":
-        numbers = [np.array([c.device]) / 65535 for c in table.colours]
-    elif profile.header.pcs == "XYZ ":
-        numbers = [np.array([c.pcs]) / 32768 for c in table.colours]
+def _plain_ramps(profile: Profile, table: NamedColours) -> tuple[Ramp, ...]:
+    stored = np.array([colour.pcs for colour in table.colours], np.float64).reshape(-1, 1, 3)
+    if profile.header.pcs == "XYZ ":
+        values = stored / 32768
     else:
         # The 16-bit encoding of version 2, in all versions.
-        numbers = [np.array([c.pcs]) * [100 / 65280, 1 / 256, 1 / 256] - [0, 128, 128] for c in table.colours]
-    return tuple(Ramp(name, full, row) for name, row in zip(named_colours(profile), numbers, strict=True))
+        values = stored * [100 / 65280, 1 / 256, 1 / 256] - [0, 128, 128]
+    return tuple(
+        Ramp(name, np.ones(1), row) for name, row in zip(named_colours(profile), values, strict=True)
+    )
