@@ -321,6 +321,12 @@ def test_values_of_expressions_whose_operands_depend_on_each_other(text, ranges,
     assert value.high == pytest.approx(expected[1], rel=2e-5)
 
 
+DECIDED = (
+    "1 in(0) 0.5 gt if {{ in(1) }} else {{ {otherwise} }} in(0) 0.5 gt if {{ 1 }} else {{ in(1) }} add "
+    + "".join(f"in(2) {k} gt in({i}) mul add " for k in range(5) for i in (3, 4, 5))
+    + "div out(0)"
+)
+"""One condition decides, five others are only counted, and more often."""
 EXISTENCE = "1 in(0) in(0,3) min(3) le in(1) in(0,3) min(3) le in(2) in(0,3) min(3) le sum(3) div out(0)"
 
 
@@ -331,6 +337,7 @@ EXISTENCE = "1 in(0) in(0,3) min(3) le in(1) in(0,3) min(3) le in(2) in(0,3) min
         ("in(0) 1 add sq in(0) 1e-8 div neg exp mul out(0)", [(0, 1e18)]),
         # One of three is the least of them.
         (EXISTENCE, [(-5, 5)] * 3),
+        (DECIDED.format(otherwise=1), [(0, 1), (0, 1), (0, 5), (0, 1), (0, 1), (0, 1)]),
         # A condition as a number keeps a sum from 0.
         ("1 in(0) in(0) 0.5 lt add div out(0)", [(0, 5)]),
         # x^2 - x + 1 has no root.
@@ -355,6 +362,7 @@ def test_the_same_programs_without_their_guards_are_not(dtype):
         ("1 in(0) sq in(0) sub 0.25 add div out(0)", [(-4, 4)]),
         ("in(0) in(1) in(1) abs 1e-9 lt if { div } else { add } out(0)", [(-1, 1), (-2, 2)]),
         ("1 in(0) in(0) sq 1 sub 0 mul add div out(0)", [(-4, 4)]),
+        (DECIDED.format(otherwise=0), [(0, 1), (0, 1), (0, 5), (0, 1), (0, 1), (0, 1)]),
     ]:
         assert outputs_of(text, ranges, dtype=dtype)[0], text
 

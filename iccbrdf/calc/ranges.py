@@ -43,9 +43,9 @@ MAX_CONTEXTUAL = 10_000
 """Nodes of a graph up to which contexts are used; selects of larger ones may be either side, always."""
 MAX_EVALUATIONS = 100_000
 """Values computed in contexts, after which no new contexts are made."""
-MAX_TRIALS = 30_000
+MAX_TRIALS = 50_000
 """Values computed in proofs by cases, after which none is tried."""
-_MAX_TRIALS_EACH = 10_000
+_MAX_TRIALS_EACH = 20_000
 """The same for one operation."""
 _MAX_PIECES = 32
 """Pieces that a range is cut into."""
@@ -457,20 +457,21 @@ class _Analyser:
 
     def enumerated(self, target: Node, context: _Context, nested: bool) -> Iterator[list[_Case]]:
         """Conditions, which hold or not, and chains of `vmin` or `vmax`, which are equal to an operand."""
-        conditions: list[tuple[int, Node]] = []
+        conditions: list[tuple[int, int, Node]] = []
         chains: list[tuple[int, Node]] = []
         for node in self.before(target):
             uses = self.uses(node, target)
             if is_truth(node):
                 if node.op != "defined" and self.known(node, context) == EITHER:
-                    conditions.append((len(uses), node))
+                    decided = sum(user.op == "select" for user in uses)
+                    conditions.append((decided, len(uses), node))
             elif node.op in ("vmin", "vmax") and all(user.op != node.op for user in uses):
                 chains.append((len(chain(node, node.op)), node))
-        # The most promising: what decides most, what has most operands, and of equals the nearest.
-        for found in (conditions, chains):
-            found.sort(key=lambda pair: -pair[0])
+        # The most promising: what decides most selects, what has most operands, and of equals the nearest.
+        conditions.sort(key=lambda ranked: ranked[:2], reverse=True)
+        chains.sort(key=lambda ranked: ranked[0], reverse=True)
         if not nested:
-            for _, condition in conditions[:_FEW]:
+            for *_, condition in conditions[:_FEW]:
                 yield [([(condition, TRUE)], {}), ([(condition, FALSE)], {})]
         for _, top in chains[:_FEW]:
             value = self.known(top, context)
