@@ -351,7 +351,7 @@ def test_no_finite_input_makes_a_result_that_is_not(name, slope_method):
     XYZ = rng.choice([0.0, 1, 1, -1], (size, 3)) * 4 * rng.uniform(0, 1, (size, 3))
     small = rng.random(size) < 0.3
     XYZ[small] *= 10 ** rng.uniform(-20, 0, (small.sum(), 1))
-    XYZ[:4] = [[0, 0, 0], [4, -2, -2], [-4, -4, -4], [4, 4, 4]]
+    XYZ[:4] = [[0, 0, 0], [4, -4, 1e-15], [-4, -4, -4], [4, 4, 4]]
     # Beside the nodes, by the last digit of a float32.
     nodes = make_primaries().XYZ
     XYZ[4:13] = nodes

@@ -1,6 +1,7 @@
 """The static check of numbers: what our templates are proven of, and what is found in programs that fail."""
 
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from test_icc_hostile import mutations
 from validate_examples import sound_mid, sound_mvis
 
 from iccbrdf.brdf.slopes import read_slopes
-from iccbrdf.build import MODELS, build_colour_mid, build_pair
+from iccbrdf.build import MODELS, build_colour_mid, build_pair, colour_mid
+from iccbrdf.calc import ranges
 from iccbrdf.calc.program import parse
 from iccbrdf.icc import (
     Calculator,
@@ -81,26 +83,56 @@ def test_models_without_their_horizon_do_not_pass():
     assert "NUM-001" in ids(numeric(pair.mvis))
 
 
+SLOPES = read_slopes(folder("profiles") / "fogra39_gloss" / "slopes.json")
+
+
 @pytest.mark.parametrize(
-    ("interpolation", "exponent", "slope_method"),
+    ("slope_method", "options"),
     [
-        ("smooth", -1, "affine"),
-        ("smooth", -1, "published"),
-        ("published", -1, None),
-        ("published", -1, "published"),
-        ("published", 1, "affine"),
+        ("affine", {}),
+        ("published", {}),
+        (None, {"interpolation": "published"}),
+        ("published", {"interpolation": "published"}),
+        ("affine", {"interpolation": "published", "exponent": 1}),
+        ("published", {"interpolation": "published", "exponent": -4, "p": 3}),
+        ("affine", {"interpolation": "published", "p": 8}),
     ],
 )
-def test_colour_mids_pass(interpolation, exponent, slope_method):
-    slopes = read_slopes(folder("profiles") / "fogra39_gloss" / "slopes.json") if slope_method else None
-    made = build_colour_mid(
-        fogra39(),
-        interpolation=interpolation,
-        exponent=exponent,
-        slopes=slopes,
-        slope_method=slope_method or "affine",
-    )
+def test_colour_mids_pass(slope_method, options):
+    slopes = SLOPES if slope_method else None
+    made = build_colour_mid(fogra39(), slopes=slopes, slope_method=slope_method or "affine", **options)
     assert numeric(made.mid) == []
+
+
+@pytest.mark.parametrize("interpolation", ["smooth", "published"])
+@pytest.mark.parametrize("count", [4, 5, 16])
+def test_colour_mids_pass_whatever_their_nodes(interpolation, count):
+    primaries = random_primaries(count=count)
+    assert numeric(build_colour_mid(primaries, interpolation=interpolation, slopes=SLOPES).mid) == []
+
+
+@pytest.mark.parametrize(
+    ("interpolation", "count", "options", "guard", "operator"),
+    [
+        ("published", 4, {"p": 8}, ("clamp(chromaticity, -1e4, 1e4)", "chromaticity"), "gama"),
+        ("smooth", 16, {}, ("min(logarithms, 40)", "logarithms"), "exp"),
+    ],
+)
+def test_colour_mids_without_their_guards_do_not(
+    monkeypatch, tmp_path, interpolation, count, options, guard, operator
+):
+    copy = tmp_path / "calc_templates"
+    shutil.copytree(folder("calc_templates"), copy)
+    template = copy / f"interpolate_{interpolation}.calc"
+    text = template.read_text("utf-8")
+    assert guard[0] in text
+    template.write_text(text.replace(*guard), "utf-8")
+    monkeypatch.setattr(colour_mid, "folder", {"calc_templates": copy}.__getitem__)
+    monkeypatch.setattr(ranges, "MAX_TRIALS", 2000)  # there is no proof to be found
+    primaries = random_primaries(count=count)
+    made = build_colour_mid(primaries, interpolation=interpolation, slopes=SLOPES, **options)
+    pattern = rf"op \d+ \({operator}\(\d+\)\) may overflow"
+    assert any(re.match(pattern, found.message) for found in numeric(made.mid))
 
 
 def test_shipped_profiles_pass_at_the_command_line(run):
