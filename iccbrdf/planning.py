@@ -15,9 +15,10 @@ import numpy as np
 
 from iccbrdf.brdf.colour_difference import XYZ_to_Lab, delta_E_CIE2000
 from iccbrdf.brdf.geometry import Array
+from iccbrdf.build.cells import FULL, Way
 from iccbrdf.build.colour_mid import DEVICE, ColourMid
 from iccbrdf.build.pair import Pair
-from iccbrdf.build.plan import FULL, Decision, Decoder, Finding, Planner, Samples, Way
+from iccbrdf.build.plan import Decision, Decoder, Finding, Planner, Samples
 from iccbrdf.build.profiles import XYZ_RANGE
 from iccbrdf.build.recipe import Recipe
 from iccbrdf.build.spans import Directions

@@ -27,13 +27,13 @@ from iccbrdf.brdf.models import MODELS, NORMAL
 from iccbrdf.build.bounds import (
     CHROMATIC_WEIGHT,
     GROUP,
+    Parameters,
     Terms,
     change_of_ways,
     changes_of_effects,
     columns,
     differences,
     geometry,
-    parameters,
 )
 from iccbrdf.build.effects import EFFECTS, MVIS, model_effects
 from iccbrdf.build.spans import Directions, Span
@@ -198,26 +198,27 @@ def weighted(one, other):
 
 
 def hull(values):
-    return Span(np.array([values.min()]), np.array([values.max()])) if values.ndim else Span.of(values)
+    flat = values.reshape(len(values), -1)
+    return Span(flat.min(axis=1, keepdims=True), flat.max(axis=1, keepdims=True))
 
 
 def spans(vectors):
-    x, y, z = (hull(component) for component in np.moveaxis(vectors, -1, 0))
-    return x, y, z
+    return hull(np.moveaxis(vectors, -1, 0))
 
 
 def bounds_of(model, pixels, lights, view, effects):
     """What the module says of the hull of some pixels and lights, by effect."""
     reflection = planning_of(model).recipe.reflection({})
-    values = columns(reflection, dict(zip(names_of(model), np.moveaxis(pixels, -1, 0), strict=True)))
-    x, y, z = spans(unit(pixels[..., -3:]))
+    channels = dict(zip(names_of(model), np.moveaxis(pixels, -1, 0), strict=True))
+    values = columns(reflection, lambda names: np.array([channels[name] for name in names]))
+    normal = spans(unit(pixels[..., -3:]))
     light, eye, to_z = spans(lights), spans(view), spans(np.array([0.0, 0.0, 1.0]))
     with np.errstate(all="ignore"):
-        terms = Terms(reflection, parameters(values, hull), geometry((x, y, z), light, eye))
+        terms = Terms(reflection, Parameters(values, hull), geometry(normal, light, eye))
         flat = Terms(reflection, terms.given, geometry(to_z, light, eye))
-        off = parameters(differences(values, values), hull)
+        off = Parameters(differences(values, values), hull)
         found = changes_of_effects(terms, [effect for effect in effects if effect != "relief"])
-        found["relief"] = change_of_ways(terms, flat, off, (x, y, z - to_z[2]), light)
+        found["relief"] = change_of_ways(terms, flat, off, normal - to_z, light)
         return {name: float(np.max(change.dE)) for name, change in found.items()}
 
 

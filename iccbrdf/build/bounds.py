@@ -41,9 +41,10 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +52,7 @@ from numpy.typing import NDArray
 from iccbrdf.brdf.cook_torrance import M_MIN, fresnel_schlick
 from iccbrdf.brdf.geometry import Array
 from iccbrdf.brdf.models import MODELS
-from iccbrdf.build.spans import ONE, ZERO, Span, Vector, cross, dot
+from iccbrdf.build.spans import ONE, ZERO, Span, cross, dot, positive_product
 
 COSINE_ERROR = 1e-6
 """Of cosines and vector products in float32, 16 units in the last place of 1."""
@@ -86,6 +87,11 @@ class Reflection:
     ambient: float = 0.0
 
     @property
+    def white_column(self) -> Array:
+        """The white, shape (3, 1)."""
+        return np.array(self.white)[:, None]
+
+    @property
     def has_facets(self) -> bool:
         """Cook-Torrance: D is Beckmann's and V is G / cos theta_v."""
         return self.model != "ward"
@@ -105,64 +111,69 @@ class Reflection:
         return self.intensity if self.has_share else self.intensity / math.pi
 
 
-Three = tuple[Span, Span, Span]
-"""For X, Y and Z."""
-
-ThreeArrays = tuple[Array, Array, Array]
+Planes = Callable[[Sequence[str]], Array]
+"""From channels by name to their values by pixel, (channels, height, width)."""
 
 Reduce = Callable[[Array], Span]
-"""From values by pixel to their spans; of a value of no axis, which all pixels have, to that."""
+"""From values (k, height, width) to their spans (k, n); of (k, 1, 1), which all pixels have, to (k, 1)."""
 
 
 @dataclass(frozen=True)
 class Columns:
-    """A model's parameters by pixel, for X, Y and Z; what serves all three is one array thrice.
+    """A model's parameters by pixel, (3, height, width) for X, Y and Z; what serves all three is (1, ...).
 
     Rd is the diffuse reflectance, of which `d` is left beside the glossy share; ks_off and m_off are ks and m
     less those of Y.
     """
 
-    d: ThreeArrays
-    ks: ThreeArrays
-    m: ThreeArrays
-    Rd: ThreeArrays
-    ks_off: ThreeArrays
-    m_off: ThreeArrays
+    d: Array
+    ks: Array
+    m: Array
+    Rd: Array
+    ks_off: Array
+    m_off: Array
 
 
-def columns(reflection: Reflection, channels: Mapping[str, Array]) -> Columns:
-    """The parameters of pixels from their channels by name."""
-    families: dict[str, ThreeArrays] = {}
+def columns(reflection: Reflection, planes: Planes) -> Columns:
+    """The parameters of pixels from their channels."""
+    families = {}
     for family, width in MODELS[reflection.model].parameters:
-        names = [f"{family}.{axis}" for axis in "XYZ"] if width == 3 else [family]
-        found = [np.asarray(channels[name], np.float64) for name in names]
-        if family == "m":
-            found = [np.maximum(m, M_MIN) for m in found]
-        x, y, z = found if width == 3 else found * 3
-        families[family] = (x, y, z)
-    Rd = families["Rd" if "Rd" in families else "kd"]
-    ks, m = families["ks"], families["m"]
-    d = Rd
-    if reflection.has_share:
-        d = ((1 - ks[0]) * Rd[0], (1 - ks[0]) * Rd[1], (1 - ks[0]) * Rd[2])
-    return Columns(d, ks, m, Rd, _less(ks, (ks[1],) * 3), _less(m, (m[1],) * 3))
+        families[family] = planes([f"{family}.{axis}" for axis in "XYZ"] if width == 3 else [family])
+    Rd, ks = families["Rd" if "Rd" in families else "kd"], families["ks"]
+    m = np.maximum(families["m"], M_MIN)
+    d = (1 - ks) * Rd if reflection.has_share else Rd
+    return Columns(d, ks, m, Rd, _less(ks, of_Y(ks)), _less(m, of_Y(m)))
 
 
-@dataclass(frozen=True)
 class Parameters:
-    """Spans of `Columns`."""
+    """The spans of columns, each of shape (3, n) or (1, n), taken when it is first asked for."""
 
-    d: Three
-    ks: Three
-    m: Three
-    Rd: Three
-    ks_off: Three
-    m_off: Three
+    def __init__(self, pixels: Columns, reduce: Reduce) -> None:
+        self._pixels, self._reduce = pixels, reduce
 
+    @cached_property
+    def d(self) -> Span:
+        return self._reduce(self._pixels.d)
 
-def parameters(pixels: Columns, reduce: Reduce) -> Parameters:
-    """The spans of columns."""
-    return Parameters(*(_spans(family, reduce) for family in vars(pixels).values()))
+    @cached_property
+    def ks(self) -> Span:
+        return self._reduce(self._pixels.ks)
+
+    @cached_property
+    def m(self) -> Span:
+        return self._reduce(self._pixels.m)
+
+    @cached_property
+    def Rd(self) -> Span:
+        return self._reduce(self._pixels.Rd)
+
+    @cached_property
+    def ks_off(self) -> Span:
+        return self._reduce(self._pixels.ks_off)
+
+    @cached_property
+    def m_off(self) -> Span:
+        return self._reduce(self._pixels.m_off)
 
 
 def differences(one: Columns, other: Columns) -> Columns:
@@ -171,14 +182,17 @@ def differences(one: Columns, other: Columns) -> Columns:
     return Columns(*(_less(a, b) for a, b in pairs))
 
 
-def _less(one: ThreeArrays, other: ThreeArrays) -> ThreeArrays:
-    x, y, z = (np.zeros(()) if a is b else a - b for a, b in zip(one, other, strict=True))
-    return x, y, z
+def _less(one: Array, other: Array) -> Array:
+    return np.zeros((1, 1, 1)) if one is other else one - other
 
 
-def _spans(family: ThreeArrays, reduce: Reduce) -> Three:
-    x, y, z = family
-    return reduce(x), reduce(y), reduce(z)
+Rows = TypeVar("Rows", Array, Span)
+
+
+def of_Y(values: Rows) -> Rows:
+    """Of values for X, Y and Z those for Y; values that serve all three themselves."""
+    shape = values.lo.shape if isinstance(values, Span) else values.shape
+    return values if shape[0] == 1 else values[1:2]
 
 
 # Geometry ----------------------------------------------------------------------------------------------
@@ -201,20 +215,18 @@ class Geometry:
     """Where one of them is below it for certain."""
 
 
-def geometry(normal: Vector, light: Vector, view: Vector) -> Geometry:
-    """From components of unit vectors whose shapes broadcast."""
-    h = (light[0] + view[0], light[1] + view[1], light[2] + view[2])
+def geometry(normal: Span, light: Span, view: Span) -> Geometry:
+    """From components of unit vectors, (3, n) or (3, 1)."""
+    h = light + view
     cos_i = dot(normal, light).within(-1, 1).widened(COSINE_ERROR)
     cos_v = dot(normal, view).within(-1, 1).widened(COSINE_ERROR)
     lit = (cos_i.lo > LIT) & (cos_v.lo > LIT)
     dark = (cos_i.hi <= LIT) | (cos_v.hi <= LIT)
     cos_i, cos_v = cos_i.within(LIT, 2), cos_v.within(LIT, 2)
     n_dot_h = dot(normal, h).widened(COSINE_ERROR).meet(cos_i + cos_v).within(LIT, 4)
-    squares = [component.square() for component in h]
-    h2 = (squares[0] + squares[1] + squares[2]).widened(4 * COSINE_ERROR).within(LIT, 4)
+    h2 = h.square().sum().widened(4 * COSINE_ERROR).within(LIT, 4)
     # |n x h|^2 both from its components and as |h|^2 - (n.h)^2, whichever is narrower.
-    squares = [component.square() for component in cross(normal, h)]
-    direct = squares[0] + squares[1] + squares[2]
+    direct = cross(normal, h).square().sum()
     rest = h2 - n_dot_h.square()
     cross_h = direct.meet(rest).within(0, 4)
     length = Span(np.sqrt(cross_h.lo), np.sqrt(cross_h.hi)).widened(COSINE_ERROR).within(0, 4)
@@ -239,19 +251,20 @@ def _lobe(reflection: Reflection, tan2: Span, m: Span) -> Span:
         m2 = m * m
         return scale * np.exp(-t / m2) * (1 + t) ** power / m2
 
-    def best_m(t: Array) -> Array:
-        return np.clip(np.sqrt(t), m.lo, m.hi)
-
-    def best_t(m: Array) -> Array:
-        return np.clip(power * m * m - 1, tan2.lo, tan2.hi)
-
-    one_m = m.lo is m.hi
-    sides = (m.lo,) if one_m else (m.lo, m.hi)
-    corners = Span.around(*(value(t, x) for t in (tan2.lo, tan2.hi) for x in sides))
-    edges = [value(best_t(x), x) for x in sides]
-    if not one_m:
-        edges += [value(t, best_m(t)) for t in (tan2.lo, tan2.hi)]
-    return Span(corners.lo, Span.around(corners.hi, *edges).hi)
+    sides = (m.lo,) if m.is_one else (m.lo, m.hi)
+    least = most = value(tan2.lo, sides[0])
+    for t, x in [(tan2.hi, sides[0])] + [(t, m.hi) for t in (tan2.lo, tan2.hi) if not m.is_one]:
+        corner = value(t, x)
+        least, most = np.minimum(least, corner), np.maximum(most, corner)
+    for x in sides:
+        best_t = power * x * x - 1
+        # Mostly the best one is below the interval, of which the nearest end has been looked at.
+        if np.any(best_t > tan2.lo):
+            most = np.maximum(most, value(np.clip(best_t, tan2.lo, tan2.hi), x))
+    if not m.is_one:
+        for t in (tan2.lo, tan2.hi):
+            most = np.maximum(most, value(t, np.clip(np.sqrt(t), m.lo, m.hi)))
+    return Span(least, most)
 
 
 class Terms:
@@ -259,13 +272,7 @@ class Terms:
 
     def __init__(self, reflection: Reflection, given: Parameters, under: Geometry) -> None:
         self.reflection, self.given, self.under = reflection, given, under
-        x, y, z = given.m
-        middle = _lobe(reflection, under.tan2_h, y)
-        self.D: Three = (
-            middle if x is y else _lobe(reflection, under.tan2_h, x),
-            middle,
-            middle if z is y else _lobe(reflection, under.tan2_h, z),
-        )
+        self.D = _lobe(reflection, under.tan2_h, given.m)
         cos_i, cos_v = under.cos_i, under.cos_v
         if reflection.has_facets:
             q = under.q
@@ -290,16 +297,27 @@ class Terms:
         cosine, n = cosine.within(0, 1), self.reflection.refractive_index
         return Span(fresnel_schlick(cosine.hi, n), fresnel_schlick(cosine.lo, n))
 
-    @property
-    def diffuse(self) -> Three:
+    @cached_property
+    def diffuse(self) -> Span:
         """g d cos theta_i."""
-        g = self.reflection.scale
-        x, y, z = ((d * self.under.cos_i).times(g) for d in self.given.d)
-        return x, y, z
+        return self.given.d.times(self.under.cos_i).times(self.reflection.scale)
 
-    def gloss(self, c: int) -> Span:
-        """g ks F D V of channel `c`."""
-        return (self.given.ks[c] * self.F * self.D[c] * self.V).times(self.reflection.scale)
+    @cached_property
+    def FV(self) -> Span:
+        """F V."""
+        return positive_product(self.F, self.V)
+
+    @cached_property
+    def gloss(self) -> Span:
+        """g ks F D V."""
+        return self.given.ks.times(positive_product(self.D, self.FV)).times(self.reflection.scale)
+
+    @cached_property
+    def seen(self) -> Span:
+        """All of it, of surfaces that are lit."""
+        lit = self.diffuse + self.gloss
+        ambient = self.reflection.ambient
+        return lit + self.given.Rd.times(ambient) if ambient else lit
 
 
 # Changes -----------------------------------------------------------------------------------------------
@@ -330,105 +348,86 @@ class Change:
 def changes_of_effects(terms: Terms, wanted: Collection[str]) -> dict[str, Change]:
     """What each of the `wanted` effects of the MVIS but relief does at most, in the steps of the module."""
     reflection, given, under = terms.reflection, terms.given, terms.under
-    g, D, F, V = reflection.scale, terms.D, terms.F, terms.V
-    diffuse, gloss = terms.diffuse, [terms.gloss(c) for c in range(3)]
-    ks = [k.join(given.ks[1]) for k in given.ks]
-    either = [d.join(D[1]) for d in D]
+    g, D, FV, V = reflection.scale, terms.D, terms.FV, terms.V_unshadowed
+    ks = given.ks.join(of_Y(given.ks))
+    either = D.join(of_Y(D))
     found: dict[str, Change] = {}
 
-    def step(change: list[Span], most: list[Span]) -> Change:
+    def step(change: Span, most: Span) -> Change:
         """Gloss changes thus, and is as much as `most` before or after."""
-        floor = [d.lo + np.minimum(w.lo, 0) for d, w in zip(diffuse, most, strict=True)]
-        ceiling = [d.hi + w.hi for d, w in zip(diffuse, most, strict=True)]
+        floor, ceiling = terms.diffuse.lo + np.minimum(most.lo, 0), terms.diffuse.hi + most.hi
         return _where_seen(reflection, under, change, floor, ceiling)
 
-    def product(left: Iterable[Span], middle: Iterable[Span], right: Span) -> list[Span]:
-        return [(a * b * right).times(g) for a, b in zip(left, middle, strict=True)]
-
     if "specular" in wanted:
-        found["specular"] = step(gloss, gloss)
+        found["specular"] = step(terms.gloss, terms.gloss)
     if "chromatic-specular" in wanted:
-        found["chromatic-specular"] = step(product(given.ks_off, D, F * V), product(ks, D, F * V))
+        lobe = positive_product(D, FV).times(g)
+        found["chromatic-specular"] = step(given.ks_off.times(lobe), ks.times(lobe))
     if "chromatic-roughness" in wanted:
-        off = [(d - D[1]).where(m.magnitude > 0, ZERO) for d, m in zip(D, given.m_off, strict=True)]
-        found["chromatic-roughness"] = step(product(ks, off, F * V), product(ks, either, F * V))
-    if "shadowing" in wanted:
-        change = [-d for d in product(ks, either, F * terms.shadow)]
-        found["shadowing"] = step(change, product(ks, either, F * terms.V_unshadowed))
-    if "fresnel" in wanted:
-        change = [-d for d in product(ks, either, (ONE - F) * V.join(terms.V_unshadowed))]
-        found["fresnel"] = step(change, product(ks, either, terms.V_unshadowed))
+        off = (D - of_Y(D)).where(given.m_off.magnitude > 0, ZERO)
+        most = ks.times(positive_product(either, FV).times(g))
+        found["chromatic-roughness"] = step((ks * off).times(FV).times(g), most)
+    if "shadowing" in wanted or "fresnel" in wanted:
+        facets = ks.times(either.times(g))
+        if "shadowing" in wanted:
+            change = -facets.times(positive_product(terms.F, terms.shadow))
+            found["shadowing"] = step(change, facets.times(positive_product(terms.F, V)))
+        if "fresnel" in wanted:
+            change = -facets.times(positive_product(ONE - terms.F, terms.V.join(V)))
+            found["fresnel"] = step(change, facets.times(V))
     if "below-horizon" in wanted:
         found["below-horizon"] = Change(under.lit, lambda: np.array(np.inf))
     if "highlight-range" in wanted:
-        found["highlight-range"] = _above_white(terms, gloss)
+        found["highlight-range"] = _above_white(terms)
     return found
 
 
-def change_of_ways(full: Terms, other: Terms, off: Parameters, n_off: Vector, light: Vector) -> Change:
+def change_of_ways(full: Terms, other: Terms, off: Parameters, n_off: Span, light: Span) -> Change:
     """What it does at most to take other parameters, another normal, or both: relief, slope, interpolation.
 
     `off` are `differences` of the parameters, `n_off` the one normal less the other.
     """
     reflection, g = full.reflection, full.reflection.scale
     one, two = full.under, other.under
-    aligned = (n_off[0].magnitude == 0) & (n_off[1].magnitude == 0) & (n_off[2].magnitude == 0)
-    cos_off = dot(n_off, light)
-    change, floor, ceiling = [], [], []
+    aligned = np.all(n_off.magnitude == 0, axis=0)
     certain = (one.lit & two.lit) | aligned
-    for c in range(3):
-        before, after = (
-            terms.diffuse[c] + terms.gloss(c) + terms.given.Rd[c].times(reflection.ambient)
-            for terms in (full, other)
-        )
-        diffuse = (full.given.d[c] * cos_off + off.d[c] * two.cos_i).times(g)
-        D_off = (full.D[c] - other.D[c]).where(off.m[c].magnitude > 0, ZERO)
-        same_place = (off.ks[c] * full.D[c] + other.given.ks[c] * D_off) * full.F * full.V
-        gloss = same_place.times(g).where(aligned, full.gloss(c) - other.gloss(c))
-        seen = diffuse + gloss + off.Rd[c].times(reflection.ambient)
-        if reflection.ambient:
-            # What is left where the lamp alone is below the surface.
-            seen = seen.join(off.Rd[c].times(reflection.ambient))
-        change.append(seen.where(certain, before.join(ZERO) - after.join(ZERO)))
-        floor.append(np.minimum(before.lo, after.lo))
-        ceiling.append(np.maximum(before.hi, after.hi))
+    diffuse = (full.given.d * dot(n_off, light) + off.d.times(two.cos_i)).times(g)
+    D_off = (full.D - other.D).where(off.m.magnitude > 0, ZERO)
+    same_place = (off.ks.times(full.D) + other.given.ks * D_off).times(full.FV)
+    change = diffuse + same_place.times(g).where(aligned, full.gloss - other.gloss)
     under = replace(one, lit=one.lit & two.lit, dark=one.dark & two.dark)
     if reflection.ambient:
+        # What is left where the lamp alone is below the surface.
+        ambient = off.Rd.times(reflection.ambient)
+        change = (change + ambient).join(ambient)
         under = replace(under, dark=np.zeros_like(under.dark))
+    before, after = full.seen, other.seen
+    change = change.where(certain, before.join(ZERO) - after.join(ZERO))
+    floor, ceiling = np.minimum(before.lo, after.lo), np.maximum(before.hi, after.hi)
     return _where_seen(reflection, under, change, floor, ceiling)
 
 
-def _above_white(terms: Terms, gloss: list[Span]) -> Change:
-    reflection = terms.reflection
-    change, floor, ceiling = [], [], []
-    for c, white in enumerate(reflection.white):
-        seen = terms.diffuse[c] + gloss[c] + terms.given.Rd[c].times(reflection.ambient)
-        change.append(Span(np.maximum(seen.lo - white, 0), np.maximum(seen.hi - white, 0)))
-        floor.append(np.full(np.shape(seen.hi), white))
-        ceiling.append(np.maximum(seen.hi, white))
+def _above_white(terms: Terms) -> Change:
+    white, seen = terms.reflection.white_column, terms.seen
+    change = Span(np.maximum(seen.lo - white, 0), np.maximum(seen.hi - white, 0))
     always = replace(terms.under, lit=np.ones_like(terms.under.lit), dark=np.zeros_like(terms.under.dark))
-    return _where_seen(reflection, always, change, floor, ceiling)
+    return _where_seen(terms.reflection, always, change, white, np.maximum(seen.hi, white))
 
 
 def _where_seen(
-    reflection: Reflection, under: Geometry, change: list[Span], floor: list[Array], ceiling: list[Array]
+    reflection: Reflection, under: Geometry, change: Span, floor: Array, ceiling: Array
 ) -> Change:
     """The change of XYZ: none where the surface is dark, perhaps none where it is not lit for certain.
 
     `floor` and `ceiling` bound the XYZ of lit surfaces before and after.
     """
-    low = [np.where(under.lit, x, np.minimum(x, 0)) for x in floor]
-    high = [np.maximum(x, 0) for x in ceiling]
-    change = [ZERO.where(under.dark, d.where(under.lit, d.join(ZERO))) for d in change]
-    pairs = list(zip(change, low, strict=True))
+    low = np.where(under.lit, floor, np.minimum(floor, 0))
+    change = ZERO.where(under.dark, change.where(under.lit, change.join(ZERO)))
     # What is not a number compares as false, and so counts as the worst.
-    exact = np.logical_and.reduce([d.magnitude <= EXACT * np.abs(x) + VANISHING for d, x in pairs])
+    exact = np.all(change.magnitude <= EXACT * np.abs(low) + VANISHING, axis=0)
 
     def bound() -> Array:
-        f = [
-            _lightness_change(d, x, y, white)
-            for (d, x), y, white in zip(pairs, high, reflection.white, strict=True)
-        ]
+        f = _lightness_change(change, low, np.maximum(ceiling, 0), reflection.white_column)
         dL, da, db = f[1].magnitude * 116, (f[0] - f[1]).magnitude * 500, (f[1] - f[2]).magnitude * 200
         dE: Array = np.sqrt(dL * dL + CHROMATIC_WEIGHT * (da * da + db * db))
         return dE
@@ -436,16 +435,20 @@ def _where_seen(
     return Change(exact, bound)
 
 
-def _lightness_change(change: Span, low: Array, high: Array, white: float) -> Span:
+def _lightness_change(change: Span, low: Array, high: Array, white: Array) -> Span:
     """The change of f(x / white), the function in L*a*b*, where x lies between `low` and `high` throughout.
 
     It is concave, so that a step of a given size does most at the low end and least at the high one.
     """
     low, high = low / white, high / white
-    up, down = change.hi / white, -change.lo / white
-    most_up = np.where(up > 0, _f(low + np.abs(up)) - _f(low), _f(high - np.abs(up)) - _f(high))
-    most_down = np.where(down > 0, _f(low + np.abs(down)) - _f(low), _f(high - np.abs(down)) - _f(high))
-    return Span(-most_down, most_up).widened(ROUNDING * _f(high))
+    f_low, f_high = _f(low), _f(high)
+
+    def most(step: Array) -> Array:
+        up = step > 0
+        moved: Array = _f(np.where(up, low, high) + step) - np.where(up, f_low, f_high)
+        return moved
+
+    return Span(-most(-change.lo / white), most(change.hi / white)).widened(ROUNDING * f_high)
 
 
 def _f(x: Array) -> Array:

@@ -12,31 +12,26 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iccbrdf.brdf.geometry import Array
-from iccbrdf.brdf.models import NORMAL
 from iccbrdf.build.bounds import (
     GROUP,
     Change,
-    Columns,
+    Parameters,
     Reflection,
     Terms,
     change_of_ways,
     changes_of_effects,
-    columns,
-    differences,
     geometry,
-    parameters,
 )
+from iccbrdf.build.cells import FULL, LEVELS, Block, Index, Pixels, Way
 from iccbrdf.build.effects import EFFECTS, MVIS, model_effects
-from iccbrdf.build.spans import ONE, ZERO, Directions, Span, Vector
-
-LEVELS = (64, 8, 2, 1)
-"""Pixels along the sides of the cells that are judged at once: tiles, parts of those that fail, pixels."""
+from iccbrdf.build.spans import Directions, Span
 
 CHUNK = 1 << 13
 """Cells that are judged at a time: their intermediate results stay in the processor's cache."""
@@ -52,24 +47,13 @@ FEW_LIGHTS = 4
 EFFORT = 2
 """Cells that are looked at, for each pixel of a block, before what is in doubt still counts as called for."""
 
-Way = frozenset[str]
-"""The effects among relief, slope and interpolation that a way to the pixel leaves out."""
-
-FULL: Way = frozenset()
 RELIEF: Way = frozenset({"relief"})
 WAYS: Way = frozenset({"relief", "slope", "interpolation"})
 
-TINY = 1e-37
-"""What the templates add to a squared length, so that no length is 0."""
-
-_SHORTEST = 1e-30
-"""Squared length of normals from which on they are of unit length once normalised."""
-
-_TO_Z: Vector = (ZERO, ZERO, ONE)
+_TO_Z = Span.of([[0.0], [0.0], [1.0]])
+_NO_OFFSET = Span.of(np.zeros((3, 1)))
 
 Samples = NDArray[np.floating[Any]]
-Index = NDArray[np.intp]
-
 
 @dataclass(frozen=True)
 class Decoder:
@@ -133,17 +117,6 @@ class _Question:
         self.exact = self.exact and bool(np.all(change.exact | ~where))
 
 
-@dataclass(frozen=True)
-class _Pixels:
-    """A block's parameters, and the components of its unit normals.
-
-    Arrays (height, width), or of no axis where all pixels have one value.
-    """
-
-    columns: Columns
-    normal: tuple[Array, Array, Array]
-
-
 class Planner:
     """Looks at the blocks of an image, one after the other, and then says what they call for.
 
@@ -193,9 +166,9 @@ class Planner:
         begun = time.perf_counter()
         open_now = [question for question in self._questions if question.open]
         ways = {FULL} | {question.way - RELIEF for question in open_now}
-        pixels = {way: self._pixels(self._decoders[way], data) for way in ways}
+        pixels = {way: self._pixels(way, data) for way in ways}
         decoded = time.perf_counter()
-        block = _Block(y0, x0, data.shape[:2], pixels)
+        block = Block(y0, x0, data.shape[:2], pixels)
         self._spent = 0
         level = next(level for level, side in enumerate(LEVELS) if side == 1 or block.count(level) >= FEWEST)
         lights, cells = np.divmod(np.arange(len(self._lights) * block.count(level)), block.count(level))
@@ -204,20 +177,13 @@ class Planner:
         self.seconds["decoding"] += decoded - begun
         self.seconds["bounding"] += time.perf_counter() - decoded
 
-    def _pixels(self, decoder: Decoder, data: Samples) -> _Pixels:
-        values = np.ascontiguousarray(np.moveaxis(decoder.decode(data), -1, 0), np.float64)
-        channels = {name: np.array(value) for name, value in self._defaults.items()}
-        channels |= dict(zip(decoder.names, values, strict=True))
-        x, y, z = (channels[name] for name in NORMAL)
-        squares = x * x + y * y + z * z
-        with np.errstate(all="ignore"):
-            # As the templates do it.  What they make of vectors next to nothing is not bounded here.
-            length = np.where((squares > 0) & (squares < _SHORTEST), np.nan, np.sqrt(squares + TINY))
-            normal = (x / length, y / length, z / length)
-        return _Pixels(columns(self._reflection, channels), normal)
+    def _pixels(self, way: Way, data: Samples) -> Pixels:
+        decoder = self._decoders[way]
+        decoded = np.asarray(decoder.decode(data), np.float64)
+        return Pixels.of(self._reflection, decoder.names, decoded, self._defaults)
 
     def _search(
-        self, block: _Block, level: int, lights: Index, cells: Index, questions: list[_Question]
+        self, block: Block, level: int, lights: Index, cells: Index, questions: list[_Question]
     ) -> None:
         """Judge `cells` of a level, each under one of `lights`; those that fail are searched more finely."""
         for start in range(0, len(cells), CHUNK):
@@ -230,7 +196,8 @@ class Planner:
             for question, change in self._changes(block, level, lights[here], cells[here], questions):
                 last = level >= question.finest
                 worse = self._worse(change, self._tolerance * (1 if last else self._refine))
-                question.note(change, ~worse)
+                if self._tolerance:
+                    question.note(change, ~worse)
                 if last and worse.any():
                     self._call(question, change, block, level, lights[here], cells[here])
                 elif worse.any():
@@ -250,7 +217,7 @@ class Planner:
         return change.dE > limit if self._tolerance else ~change.exact
 
     def _call(
-        self, question: _Question, change: Change, block: _Block, level: int, lights: Index, cells: Index
+        self, question: _Question, change: Change, block: Block, level: int, lights: Index, cells: Index
     ) -> None:
         """The answer is no.  A way that is gone takes its questions with it."""
         worst = int(np.argmax(np.where(change.exact, -1, change.dE)))
@@ -262,37 +229,37 @@ class Planner:
                 other.open = other.open and other.way != question.way
 
     def _changes(
-        self, block: _Block, level: int, lights: Index, cells: Index, questions: list[_Question]
+        self, block: Block, level: int, lights: Index, cells: Index, questions: list[_Question]
     ) -> Iterator[tuple[_Question, Change]]:
         """The change of each question that is open, by cell under its light."""
-        light, view = _taken(self._lights.vector, lights), self._view.vector
-        x, y, z = block.normal(level, cells)
-        terms: dict[Way, Terms] = {}
+        light, view = self._lights.vector, self._view.vector
+        if len(self._lights) > 1:
+            light = light[:, lights]
 
         def reduce(values: Array) -> Span:
             return block.spans(values, level, cells)
 
-        def on(way: Way) -> Terms:
-            if way not in terms:
-                under = geometry(_TO_Z if way >= RELIEF else (x, y, z), light, view)
-                given = parameters(block.pixels[way - RELIEF].columns, reduce)
-                terms[way] = Terms(self._reflection, given, under)
-            return terms[way]
+        @cache
+        def given(way: Way) -> Parameters:
+            return Parameters(block.pixels[way].columns, reduce)
 
+        @cache
+        def on(way: Way) -> Terms:
+            under = geometry(_TO_Z if way >= RELIEF else normal, light, view)
+            return Terms(self._reflection, given(way - RELIEF), under)
+
+        normal = reduce(block.pixels[FULL].normal)
         for way in dict.fromkeys(question.way for question in questions):
-            asked = {
-                question.effect: question for question in questions if question.way == way and question.open
-            }
-            found: dict[str | None, Change] = {}
+            asked = {q.effect: q for q in questions if q.way == way and q.open}
             if None in asked:
-                off = parameters(block.off(way - RELIEF), reduce)
-                n_off = (x, y, z - ONE) if way >= RELIEF else (ZERO, ZERO, ZERO)
-                found[None] = change_of_ways(on(FULL), on(way), off, n_off, light)
-            effects = [effect for effect in asked if effect is not None]
+                n_off = normal - _TO_Z if way >= RELIEF else _NO_OFFSET
+                off = Parameters(block.off(way - RELIEF), reduce)
+                change = change_of_ways(on(FULL), on(way), off, n_off, light)
+                yield asked[None], change.broadcast(cells.shape)
+            # The way may be gone by now, and its questions with it.
+            effects = [effect for effect, question in asked.items() if effect is not None and question.open]
             if effects:
-                found.update(changes_of_effects(on(way), effects))
-            for effect, change in found.items():
-                if asked[effect].open:
+                for effect, change in changes_of_effects(on(way), effects).items():
                     yield asked[effect], change.broadcast(cells.shape)
 
     # Deciding --------------------------------------------------------------------------------------------
@@ -351,94 +318,3 @@ class Planner:
 
 def _decision(without: Way, bound: float, exact: bool) -> Decision:
     return Decision(tuple(name for name in EFFECTS if name in without), bound, exact)
-
-
-def _taken(vector: Vector, rows: Index) -> Vector:
-    """Some elements of a vector of spans."""
-    x, y, z = (_at(span, rows) for span in vector)
-    return x, y, z
-
-
-def _at(span: Span, rows: Index) -> Span:
-    low = span.lo[rows]
-    # One number stays one, which is told by the arrays being the same.
-    return Span(low, low if span.hi is span.lo else span.hi[rows])
-
-
-def _joined(function: np.ufunc, values: Array, times: int) -> Array:
-    """So many neighbouring rows at a time as one by a function of two; the last ones may be fewer."""
-    joined: Array = values[::times].copy()
-    for first in range(1, times):
-        rows = values[first::times]
-        function(joined[: len(rows)], rows, out=joined[: len(rows)])
-    return joined
-
-
-class _Block:
-    """A block of pixels, and the cells of each level that it is cut into, numbered row by row."""
-
-    def __init__(self, y0: int, x0: int, shape: tuple[int, ...], pixels: Mapping[Way, _Pixels]) -> None:
-        self.pixels = pixels
-        self._corner = y0, x0
-        self._shape = shape
-        self._spans: dict[tuple[int, int], Span] = {}
-        self._off: dict[Way, Columns] = {}
-
-    def _size(self, level: int) -> tuple[int, int]:
-        height, width = self._shape
-        return -(-height // LEVELS[level]), -(-width // LEVELS[level])
-
-    def count(self, level: int) -> int:
-        """The number of cells."""
-        rows, columns = self._size(level)
-        return rows * columns
-
-    def off(self, way: Way) -> Columns:
-        """The parameters of the full way less those of another."""
-        if way not in self._off:
-            self._off[way] = differences(self.pixels[FULL].columns, self.pixels[way].columns)
-        return self._off[way]
-
-    def normal(self, level: int, cells: Index) -> Vector:
-        """The spans of the normals' components."""
-        x, y, z = (self.spans(component, level, cells) for component in self.pixels[FULL].normal)
-        return x, y, z
-
-    def spans(self, values: Array, level: int, cells: Index) -> Span:
-        """The spans of values by pixel, (height, width), in some cells; `values` must be the block's own."""
-        if values.ndim == 0:
-            return Span.of(values)
-        return _at(self._whole(values, level), cells)
-
-    def _whole(self, values: Array, level: int) -> Span:
-        """The spans of all cells, from those of the cells of the next level."""
-        key = id(values), level
-        if key not in self._spans:
-            if level == len(LEVELS) - 1:
-                self._spans[key] = Span.of(values.ravel())
-            else:
-                finer, size = self._whole(values, level + 1), self._size(level + 1)
-                times = LEVELS[level] // LEVELS[level + 1]
-                low, high = (
-                    _joined(function, _joined(function, ends.reshape(size), times).T, times).T.ravel()
-                    for function, ends in ((np.minimum, finer.lo), (np.maximum, finer.hi))
-                )
-                self._spans[key] = Span(low, high)
-        return self._spans[key]
-
-    def finer(self, level: int, cells: Index) -> tuple[Index, Index]:
-        """The cells of the next level within `cells`, and which of these each of them lies in."""
-        times = LEVELS[level] // LEVELS[level + 1]
-        y, x = np.divmod(cells, self._size(level)[1])
-        rows, columns = self._size(level + 1)
-        steps = np.arange(times)
-        children_y = (y[:, None, None] * times + steps[:, None]) + 0 * steps
-        children_x = (x[:, None, None] * times + steps) + 0 * steps[:, None]
-        inside = (children_y < rows) & (children_x < columns)
-        parents = np.broadcast_to(np.arange(len(cells))[:, None, None], inside.shape)
-        return (children_y * columns + children_x)[inside], parents[inside]
-
-    def place(self, level: int, cell: int) -> tuple[int, int]:
-        """Row and column in the image of a cell's first pixel."""
-        y, x = divmod(cell, self._size(level)[1])
-        return self._corner[0] + y * LEVELS[level], self._corner[1] + x * LEVELS[level]

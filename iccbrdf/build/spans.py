@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,21 +38,43 @@ class Span:
             lo, hi = np.minimum(lo, value), np.maximum(hi, value)
         return cls(lo, hi)
 
+    @property
+    def is_one(self) -> bool:
+        """Whether these are single numbers; the ends are then one and the same array."""
+        return self.lo is self.hi
+
+    def __getitem__(self, rows: Any) -> Span:
+        """Parts of both ends."""
+        low = self.lo[rows]
+        return Span(low, low if self.is_one else self.hi[rows])
+
     def __add__(self, other: Span) -> Span:
-        return Span(self.lo + other.lo, self.hi + other.hi)
+        low = self.lo + other.lo
+        return Span(low, low if self.is_one and other.is_one else self.hi + other.hi)
 
     def __sub__(self, other: Span) -> Span:
-        return Span(self.lo - other.hi, self.hi - other.lo)
+        low = self.lo - other.hi
+        return Span(low, low if self.is_one and other.is_one else self.hi - other.lo)
 
     def __neg__(self) -> Span:
         return Span(-self.hi, -self.lo)
 
     def __mul__(self, other: Span) -> Span:
-        return Span.around(self.lo * other.lo, self.lo * other.hi, self.hi * other.lo, self.hi * other.hi)
+        if self.is_one:
+            self, other = other, self
+        if not other.is_one:
+            return Span.around(self.lo * other.lo, self.lo * other.hi, self.hi * other.lo, self.hi * other.hi)
+        product = self.lo * other.lo
+        return Span(product, product) if self.is_one else Span.around(product, self.hi * other.lo)
 
-    def times(self, factor: Array | float) -> Span:
+    def times(self, factor: Span | Array | float) -> Span:
         """Times numbers that are not negative."""
-        return Span(self.lo * factor, self.hi * factor)
+        if not isinstance(factor, Span):
+            return Span(self.lo * factor, self.hi * factor)
+        return Span(
+            np.minimum(self.lo * factor.lo, self.lo * factor.hi),
+            np.maximum(self.hi * factor.lo, self.hi * factor.hi),
+        )
 
     def join(self, other: Span) -> Span:
         """The narrowest around both."""
@@ -63,7 +86,7 @@ class Span:
 
     def within(self, low: float, high: float) -> Span:
         """Numbers held within bounds."""
-        return Span(np.clip(self.lo, low, high), np.clip(self.hi, low, high))
+        return Span(*(np.minimum(np.maximum(end, low), high) for end in (self.lo, self.hi)))
 
     def widened(self, by: Array | float) -> Span:
         """So much wider at both ends."""
@@ -84,26 +107,34 @@ class Span:
         return Span(np.where(condition, self.lo, other.lo), np.where(condition, self.hi, other.hi))
 
 
-Vector = tuple[Span, Span, Span]
-"""x, y and z."""
+    def sum(self) -> Span:
+        """Over the first axis."""
+        low = np.add.reduce(self.lo)
+        return Span(low, low if self.is_one else np.add.reduce(self.hi))
+
 
 ZERO = Span.of(0.0)
 ONE = Span.of(1.0)
 
-
-def dot(a: Sequence[Span], b: Sequence[Span]) -> Span:
-    """The scalar products of vectors."""
-    x, y, z = (p * q for p, q in zip(a, b, strict=True))
-    return x + y + z
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 
 
-def cross(a: Vector, b: Vector) -> Vector:
+def positive_product(*factors: Span) -> Span:
+    """Of numbers none of which is negative."""
+    low, high = factors[0].lo, factors[0].hi
+    for factor in factors[1:]:
+        low, high = low * factor.lo, high * factor.hi
+    return Span(low, high)
+
+
+def dot(a: Span, b: Span) -> Span:
+    """The scalar products of vectors, whose first axis is x, y, z."""
+    return (a * b).sum()
+
+
+def cross(a: Span, b: Span) -> Span:
     """The vector products."""
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
+    return a[_NEXT] * b[_LAST] - a[_LAST] * b[_NEXT]
 
 
 CELL = 5.0
@@ -114,8 +145,8 @@ CELL = 5.0
 class Directions:
     """Unit vectors: each of n elements is one direction, or all that a part of a range holds."""
 
-    vector: Vector
-    """Components of shape (n,)."""
+    vector: Span
+    """Components x, y, z, shape (3, n)."""
     examples: Array
     """One of the directions of each element, shape (n, 3)."""
     texts: tuple[str, ...]
@@ -132,8 +163,7 @@ class Directions:
         if not lengths.all():
             raise UsageError("light or view: found a vector of length 0, which has no direction")
         unit = vectors / lengths
-        x, y, z = (Span.of(component) for component in unit.T)
-        return cls((x, y, z), unit, tuple(texts))
+        return cls(Span.of(unit.T), unit, tuple(texts))
 
     @classmethod
     def between(cls, start: tuple[float, float], end: tuple[float, float]) -> Directions:
@@ -148,19 +178,19 @@ class Directions:
         pairs = [(zenith, azimuth) for zenith in cells[0] for azimuth in cells[1]]
         zeniths, azimuths = (np.array(part) for part in zip(*pairs, strict=True))
         sin_z, cos_z = _sine(zeniths), _sine(zeniths + 90)
-        vector = (sin_z * _sine(azimuths + 90), sin_z * _sine(azimuths), cos_z)
+        components = (sin_z * _sine(azimuths + 90), sin_z * _sine(azimuths), cos_z)
+        vector = Span(np.stack([c.lo for c in components]), np.stack([c.hi for c in components]))
         texts = [f"{z[0]:g}..{z[1]:g},{a[0]:g}..{a[1]:g}" for z, a in pairs]
         examples = direction(zeniths.mean(axis=1), azimuths.mean(axis=1))
         return cls(vector, examples, tuple(texts))
 
     def join(self, other: Directions) -> Directions:
         """These and those."""
-        x, y, z = (
-            Span(np.concatenate([a.lo, b.lo]), np.concatenate([a.hi, b.hi]))
-            for a, b in zip(self.vector, other.vector, strict=True)
-        )
+        lo = np.concatenate([self.vector.lo, other.vector.lo], axis=1)
+        one = self.vector.is_one and other.vector.is_one
+        hi = lo if one else np.concatenate([self.vector.hi, other.vector.hi], axis=1)
         examples = np.concatenate([self.examples, other.examples])
-        return Directions((x, y, z), examples, self.texts + other.texts)
+        return Directions(Span(lo, hi), examples, self.texts + other.texts)
 
 
 def _sine(degrees: Array) -> Span:
