@@ -27,7 +27,7 @@ from iccbrdf.errors import InputError, LimitError, UnsupportedError, UsageError
 from iccbrdf.files import StrPath
 from iccbrdf.images import Block, ImageSource, Place, TiffSink, create_tiff, processors
 from iccbrdf.images.blocks import Array
-from iccbrdf.images.checks import NonFinite, admitted, not_finite, steeper
+from iccbrdf.images.checks import NonFinite, admitted, check_scale, not_finite, steeper
 from iccbrdf.images.tiff_writer import SampleType
 
 LOCAL = "local"
@@ -139,6 +139,7 @@ class _Work:
     def __call__(self, data: Array, block_info: Any) -> Array:
         (y0, _), (x0, _), _ = block_info[0]["array-location"]
         block, not_finite_in = admitted(Block(y0, x0, data), self.nonfinite, "the image")
+        check_scale(block, self.samples, self.transform.channels_in, "the image")
         data = block.data
         result = self.transform(data)
         encoded = self.sink.encode(Block(y0, x0, result))

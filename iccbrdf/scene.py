@@ -39,16 +39,19 @@ def that_are_read(values: Mapping[str, float], variables: Collection[str]) -> di
 
 def parse_direction(option: str, text: str) -> tuple[float, float, float]:
     """A unit vector from `ZENITH,AZIMUTH` in degrees or from a vector `X,Y,Z` of any length."""
-    numbers = [parse_number(option, part) for part in text.split(",")]
+    parts = text.split(",")
+    if len(parts) not in (2, 3):
+        raise UsageError(f"{option} {text!r}: expected ZENITH,AZIMUTH in degrees or a vector X,Y,Z")
+    numbers = [parse_number(option, part) for part in parts]
     if len(numbers) == 2:
         if abs(numbers[0]) > 90:
             raise UsageError(f"{option} {text!r}: the zenith angle is {numbers[0]:g}, expected -90 to 90")
         vector = direction(*numbers)
-    elif len(numbers) == 3:
+    else:
         # Scaled first, so that no square overflows or vanishes.
         vector = np.array(numbers) / (max(map(abs, numbers)) or 1)
-    else:
-        raise UsageError(f"{option} {text!r}: expected ZENITH,AZIMUTH in degrees or a vector X,Y,Z")
+        if numbers[2] < 0:
+            raise UsageError(f"{option} {text!r}: z is {numbers[2]:g}, behind the print; expected 0 or more")
     length = np.linalg.norm(vector)
     if length == 0:
         raise UsageError(f"{option} {text!r}: a vector of length 0 has no direction")

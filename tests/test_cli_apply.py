@@ -263,6 +263,28 @@ def test_deviating_profile_is_warned_about(run, tmp_path, image):
     assert "M2B2" in result.err
 
 
+def test_images_that_do_not_go_with_the_first_profile(run, tmp_path, image):
+    out = ["-o", tmp_path / "out.tif"]
+    alone = run("apply", image, "-p", MVIS, *out)
+    assert (alone.code, "begin with the MID" in alone.err) == (2, True)
+    with create_tiff(tmp_path / "named.tif", 1, 1, ["X", "Y", "Z"], samples="real") as sink:
+        sink.write(Block(0, 0, np.ones((1, 1, 3), np.float32)))
+    named = run("apply", tmp_path / "named.tif", "-p", MID, "-p", MVIS, *out)
+    assert (named.code, "the image holds X, Y, Z, the first profile takes kd.X, " in named.err) == (3, True)
+
+
+def test_XYZ_on_another_scale(run, tmp_path):
+    data = np.tile(np.float32([0.8, 0.9, 0.7, 0, 0, 1]), (4, 5, 1))
+    names = ",".join(["X", "Y", "Z", *NAMES[-3:]])
+    for scale, code in ((1, 0), (100, 3)):
+        data[..., :3] *= scale
+        path = write(tmp_path / f"{scale}.tif", data)
+        chain = ["-p", MID.with_name("colour-mid.icc"), "-p", MVIS, "-o", tmp_path / f"out{scale}.tif"]
+        result = run("apply", path, *chain, "--samples", "real", "--channels", names)
+        assert result.code == code
+    assert "the mean of Y is 90, expected XYZ with Y = 1 for white" in result.err
+
+
 @pytest.mark.parametrize(
     ("options", "code", "message"),
     [
@@ -273,8 +295,9 @@ def test_deviating_profile_is_warned_about(run, tmp_path, image):
         (["--env", "litX=nan"], 2, "expected a finite number"),
         (["--light", "60"], 2, "--light '60': expected ZENITH,AZIMUTH in degrees or a vector X,Y,Z"),
         (["--light", "95,0"], 2, "zenith angle is 95, expected -90 to 90"),
+        (["--light", "0,1,-1"], 2, "--light '0,1,-1': z is -1, behind the print"),
         (["--view", "0,0,0"], 2, "a vector of length 0 has no direction"),
-        (["--view", "up"], 2, "--view: found 'up', expected a finite number"),
+        (["--view", "up"], 2, "--view 'up': expected ZENITH,AZIMUTH"),
         (["--channels", "kd.X,kd.Y"], 2, "--channels names 2 channels, the image has 10"),
         (["--channels", ",".join([*NAMES[:9], "n.Z"])], 2, "'n.Z' is not in the first profile: did you mean"),
         (["--channels", ",".join([*NAMES[:9], "n.y"])], 2, "'n.y' comes twice"),

@@ -192,7 +192,7 @@ def test_a_sweep_goes_from_one_light_to_the_other():
     for text, message in (
         ("60,0", "expected FROM:TO"),
         ("1,0,1:60,0", "not a vector"),
-        ("a:b", "finite number"),
+        ("a,0:b,0", "finite number"),
     ):
         with pytest.raises(UsageError, match=message):
             sweep(job(sweep=text), np.pi)

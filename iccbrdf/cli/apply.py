@@ -8,6 +8,7 @@ from typing import Any, Literal
 import click
 
 from iccbrdf import images
+from iccbrdf.brdf.models import NORMAL
 from iccbrdf.build import image_link, last_slope
 from iccbrdf.cli.options import (
     backend_option,
@@ -28,14 +29,14 @@ from iccbrdf.cli.pipeline import (
     run,
     run_on_cluster,
 )
-from iccbrdf.cmm import MAX_COST, link
+from iccbrdf.cmm import MAX_COST, Transform, link
 from iccbrdf.cmm.effects import SUBSTITUTES
 from iccbrdf.errors import UsageError
 from iccbrdf.icc import Profile, read_profile
 from iccbrdf.images import ImageSource, Samples, WithNormals, processors
 from iccbrdf.images.blocks import Array
 from iccbrdf.images.checks import NonFinite
-from iccbrdf.scene import that_are_read
+from iccbrdf.scene import LIGHT, VIEW, that_are_read
 
 MOST_WORKERS = 8
 """Unless more are asked for: reading and writing keep no more busy, and each takes memory."""
@@ -107,6 +108,19 @@ def _recompiled(
     chain, known = with_effects(chain, asked)
     rest = effects if isinstance(effects, str) else [name for name in effects if name not in known]
     return chain, rest, [name for name in without if name not in known]
+
+
+def _check_decoded(first: Profile, source: ImageSource, transform: Transform) -> None:
+    """Refuse encoded normals where nothing decodes them, for the picture would be a wrong one."""
+    if (
+        first.header.device_class == "mvis"
+        and source.samples == "device"
+        and not {*NORMAL}.isdisjoint(transform.channels_in)
+    ):
+        raise UsageError(
+            f"the image holds device values, and {first.source} takes real ones: begin with the MID "
+            "(-p MID -p MVIS), or say --samples real where a float image holds these"
+        )
 
 
 @click.command("apply", epilog=EPILOG)
@@ -228,7 +242,10 @@ def command(
         if normals is not None:
             own = declared or opened.names
             if own is None or len(own) != opened.channels:
-                raise UsageError(f"name the image's {opened.channels} channels with --channels")
+                raise UsageError(
+                    f"{image}: found {opened.channels} channels without names beside those of the relief; "
+                    "name them with --channels, such as X,Y,Z"
+                )
             source, declared = WithNormals(opened, own, normals), None
         settings: dict[str, Any] = {
             "intent": intent,
@@ -246,6 +263,7 @@ def command(
         names = arranged_channels(source, transform.channels_in, declared)
         if names is not None:
             transform = link(chain, channels=names, **settings)
+        _check_decoded(chain[0], source, transform)
         common: dict[str, Any] = {
             "overwrite": force,
             "last_slope": last_slope(chain[0]),
@@ -292,10 +310,13 @@ def command(
             err=True,
         )
     text = [f"{image}: {size}, {len(transform.channels_in)} channels ({source.samples} samples)"]
+    if not {*LIGHT, *VIEW}.isdisjoint(transform.variables):
+        own = "of the profiles"
+        text.append(f"  light {light or own}, view {view or own}")
     for output in done.outputs:
         counts = [f"{n} {name.replace('_', ' ')}" for name, n in output.items() if name != "path" and n]
         text.append(f"  -> {output['path']}" + (f" ({', '.join(counts)})" if counts else ""))
-    if transform.adaptive and done.kinds:
+    if transform.adaptive and done.kinds and effects is not None:
         shares = (f"{n / done.kinds.total():.0%} {kind}" for kind, n in done.kinds.most_common())
         text.append(f"  tiles: {', '.join(shares)}")
     emit(as_json, "iccbrdf.apply/1", result, "\n".join(text))

@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from iccbrdf.cmm import Tally, Transform, standard_XYZ
-from iccbrdf.errors import UsageError, nearest
+from iccbrdf.errors import InputError, UsageError, nearest
 from iccbrdf.files import check_target
 from iccbrdf.icc import Profile
 from iccbrdf.images import ImageSource, Place, Samples, create_tiff, in_order, open_tiff
-from iccbrdf.images.checks import NonFinite, admitted, not_finite, steeper
+from iccbrdf.images.checks import NonFinite, admitted, check_scale, not_finite, steeper
 
 TIFF_SUFFIXES = (".tif", ".tiff")
 PNG_SUFFIX = ".png"
@@ -126,7 +126,7 @@ def run(
     LimitError
         The image costs more than the transform allows.
     InputError
-        The image cannot be read, or is not finite and shall be.
+        The image cannot be read, is not finite and shall be, or holds XYZ on another scale.
     """
     to_display = None
     if any(output.is_png for output in outputs):
@@ -149,6 +149,7 @@ def run(
 
         def work(place: Place) -> _Worked:
             block, not_finite_in = admitted(source.read(place), nonfinite, label)
+            check_scale(block, source.samples, transform.channels_in, label)
             data, kinds = transform.tallied(block.data)
             result = block._replace(data=data)
             display = block._replace(data=to_display(result.data)) if to_display else result
@@ -284,8 +285,14 @@ def arranged_channels(
 ) -> Sequence[str] | None:
     """The names to link by: those declared, else those in the file; None where there are neither.
 
-    `own` are the first profile's.  Raises UsageError where the number of names or channels does not fit, or
-    where a declared name is unknown or comes twice.
+    `own` are the first profile's.
+
+    Raises
+    ------
+    UsageError
+        The number of names or channels does not fit; a declared name is unknown or comes twice.
+    InputError
+        A name in the file is none of the first profile.
     """
     if declared is None and source.names is None and source.channels != len(own):
         raise UsageError(
@@ -293,6 +300,11 @@ def arranged_channels(
             f"({', '.join(own)}); name the image's channels with --channels"
         )
     if declared is None:
+        recorded = source.names or ()
+        if not set(recorded) <= set(own):
+            raise InputError(
+                f"the image holds {', '.join(recorded)}, the first profile takes {', '.join(own)}"
+            )
         return source.names
     if len(declared) != source.channels:
         raise UsageError(f"--channels names {len(declared)} channels, the image has {source.channels}")

@@ -14,6 +14,9 @@ from iccbrdf.images.blocks import Array, Block
 NonFinite: TypeAlias = Literal["keep", "zero", "error"]
 """What becomes of a pixel with samples that are not finite: it goes on, all its samples are 0, or no more."""
 
+_BRIGHTEST = 2.0
+"""Mean Y of a block of a flat print, at most: papers with optical brighteners come to 1."""
+
 
 def all_within(data: Array, limit: float) -> bool:
     """Whether all of `data`, floats of any size and byte order, are surely in 0..limit.
@@ -58,6 +61,26 @@ def admitted(block: Block, treatment: NonFinite, label: str) -> tuple[Block, int
         f"{label}: row {block.y0 + y}, column {block.x0 + x}, channel {channel}: found "
         f"{float(block.data[y, x, channel]):g}, expected a finite number; --nonfinite says what else to do"
     )
+
+
+def check_scale(block: Block, samples: str, names: Sequence[str], label: str) -> None:
+    """Refuse a flat print, of real X, Y, Z and normals, on another scale than Y = 1 for white.
+
+    Parameters are those of `admitted` and `steeper`.
+
+    Raises
+    ------
+    InputError
+        The mean of Y is above 2, as it is where white has 100.
+    """
+    if samples != "real" or not {"X", "Y", "Z", *NORMAL} <= set(names):
+        return
+    with np.errstate(over="ignore", invalid="ignore"):
+        mean = float(block.data[..., names.index("Y")].mean())
+    if _BRIGHTEST < mean < np.inf:
+        raise InputError(
+            f"{label}: rows from {block.y0}: the mean of Y is {mean:.3g}, expected XYZ with Y = 1 for white"
+        )
 
 
 def steeper(data: Array, samples: str, names: Sequence[str], limit: float | None) -> int:

@@ -27,6 +27,7 @@ from iccbrdf.icc import Profile
 from iccbrdf.icc.header import D50
 from iccbrdf.images import Block, Place, Samples, TiffSource, open_tiff
 from iccbrdf.images.blocks import Array
+from iccbrdf.images.checks import check_scale
 from iccbrdf.images.little_cms import check_profile, to_XYZ
 from iccbrdf.images.tiff_storage import LAB_PHOTOMETRICS
 from iccbrdf.measure.colorimetry import Lab_to_XYZ
@@ -106,7 +107,9 @@ class ColourIn:
         block = self._tiff.read(place)
         # What is not finite is counted where it is computed with.
         with np.errstate(over="ignore", invalid="ignore"):
-            return block._replace(data=self._to_XYZ(block.data))
+            block = block._replace(data=self._to_XYZ(block.data))
+        check_scale(block, self.samples, XYZ_NAMES + NORMAL, str(self._path))
+        return block
 
     @property
     def summary(self) -> dict[str, Any]:
