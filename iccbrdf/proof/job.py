@@ -177,7 +177,9 @@ def _read(values: Mapping[str, Any], base: Path, place: str, failure: type[IccBr
         try:
             read[name.replace("-", "_")] = SETTINGS[name].read(value, base)
         except ValueError as error:
-            raise failure(f"{place}{name}: found {value!r}, expected {error}") from None
+            # An option that may be repeated comes as a tuple.
+            found = ", ".join(map(str, value)) if isinstance(value, tuple) else value
+            raise failure(f"{place}{name}: found {found!r}, expected {error}") from None
     return read
 
 

@@ -105,14 +105,14 @@ def _make(job: Job, overwrite: bool, workers: int, advance: Callable[[int, int],
         display_profile(job.display), job.exposure, cast(Highlights, job.highlights), job.gamut_warning
     )
     outputs = _Outputs(job, stills)
-    make_folder(job.output)
-    for file in (*PROFILES, *outputs.names, log.NAME):
-        check_target(job.output / file, overwrite=overwrite)
-
     printer = read_profile(job.printer) if job.printer is not None else None
     with ExitStack() as stack:
         colours = stack.enter_context(ColourIn(job.image, printer, primaries))
         source = _with_relief(job, colours)
+        # Inputs that are wrong leave no empty folder.
+        make_folder(job.output)
+        for file in (*PROFILES, *outputs.names, log.NAME):
+            check_target(job.output / file, overwrite=overwrite)
         height, width = source.height, source.width
         to_brdf = link([colour.mid], samples="real", channels=source.names)
         chain = Chain(
