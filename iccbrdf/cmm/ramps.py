@@ -201,7 +201,7 @@ def _ramp(colour: TagStruct, member: Member, shape: tuple[int, int], lightest: A
         raise ProfileError(f"{place}, tints: found type {told.signature!r}, expected numbers")
     if len(tints) != len(values):
         raise ProfileError(f"{place}: found {len(tints)} tints for {len(values)} {_WHAT[member]}")
-    if not (tints[0] >= 0 and tints[-1] <= 1 and (np.diff(tints) > 0).all()):
+    if not ((tints >= 0).all() and (tints <= 1).all() and (np.diff(tints) > 0).all()):
         raise ProfileError(f"{place}, tints: found {tints}, expected numbers that increase within 0..1")
     if tints[0] > 0 and len(lightest) == 1:
         tints, values = np.concatenate([[0.0], tints]), np.concatenate([lightest, values])

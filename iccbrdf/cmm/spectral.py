@@ -77,8 +77,13 @@ def to_spectra(before: Stage, after: Stage) -> list[Step]:
         seen_by, light = observer(before.viewing), _light(before)
         _check_factors(before, source.steps * light.steps, destination.steps)
         if there in _REFLECTED:
-            with np.errstate(divide="ignore"):
-                matrix = matrix / seen_by.reflected(source)
+            white = seen_by.reflected(source)
+            if not (white > 0).all():
+                raise ProfileError(
+                    f"{before.viewing.source}: tag svcn: illuminant: found no light at some wavelengths, "
+                    "expected some at all, to tell reflectance by"
+                )
+            matrix = matrix / white
         matrix = _on_matrices(matrix, seen_by.reflected(light))
     return [_matrix(matrix, before)]
 
