@@ -52,7 +52,8 @@ def link(
     ----------
     profiles
         The chain, in order: a MID and an MVIS, either of them alone, or any chain whose spaces meet, of
-        versions 2, 4 and 5.
+        versions 2, 4 and 5.  Named colours at the start are taken by their position among `named_colours`
+        (cmm/ramps.py) and, from version 5 on, a tint of 0 to 1; at the end they give the nearest one's.
     env
         Run-time variables by name; those not given take the defaults that the programs hold.
     backend
@@ -103,7 +104,8 @@ def link(
     VariableError
         `env` names a variable that no profile reads.
     UnsupportedError
-        The back end that is asked for is not installed, or cannot run these profiles.
+        The back end that is asked for is not installed, or cannot run these profiles; or a profile is of a
+        kind that cannot run, such as a colour encoding by a name that is not known here.
     UsageError
         An argument has no such value.
     """
