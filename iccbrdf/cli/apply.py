@@ -63,14 +63,14 @@ Examples:
 """
 
 
-def read_relief(
+def _relief(
     normal_map: Path | None,
     green: str,
     height_map: Path | None,
     relief: float | None,
     pitch: float | None,
 ) -> Array | None:
-    """Normals from one of the two kinds of maps, or None where neither is given."""
+    """Unit normals, (height, width, 3), from one of the two kinds of maps; None where neither is given."""
     if normal_map is not None and height_map is not None:
         raise UsageError("--normals and --height are two ways to say one thing: give one of them")
     if (height_map is None) != (relief is None) or (height_map is None) != (pitch is None):
@@ -235,7 +235,7 @@ def command(
         raise UsageError("a cluster reads one image: leave --normals and --height out, or --cluster")
     if cluster is not None and image.suffix.lower() == EXR_SUFFIX:
         raise UsageError(f"a cluster reads TIFFs, whose blocks can be found one by one; found {image}")
-    normals = read_relief(normal_map, green, height_map, relief, pitch)
+    normals = _relief(normal_map, green, height_map, relief, pitch)
     with open_image(image, samples) as opened:
         declared = name_list(channels) if channels is not None else None
         source: ImageSource = opened

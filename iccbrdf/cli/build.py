@@ -14,6 +14,7 @@ from iccbrdf.build import GRIDS, INTERPOLATIONS, SLOPE_METHODS, ColourMid, build
 from iccbrdf.build.pair import FRESNEL_ANGLES
 from iccbrdf.build.recipe import Recipe
 from iccbrdf.cli.options import (
+    CHECK_FAILED,
     FiniteRange,
     emit,
     environment,
@@ -27,7 +28,6 @@ from iccbrdf.errors import UsageError
 from iccbrdf.files import make_folder, write_together
 from iccbrdf.images.record import Samples
 
-CHECK_FAILED = 1
 ROUNDING = 1e-3
 """CIEDE2000 that float32 may make of nothing."""
 

@@ -16,6 +16,7 @@ from iccbrdf.brdf.slopes import read_slopes
 from iccbrdf.build import INTERPOLATIONS, SLOPE_METHODS
 from iccbrdf.build.recipe import Recipe
 from iccbrdf.cli.options import (
+    CHECK_FAILED,
     FiniteRange,
     emit,
     environment,
@@ -36,7 +37,6 @@ from iccbrdf.report.cost_tables import markdown, text
 from iccbrdf.report.cost_ways import PLAIN
 
 SCHEMA = "iccbrdf.cost/1"
-CHECK_FAILED = 1
 BUDGET = 1.0
 """CIEDE2000, where nothing else is asked for."""
 

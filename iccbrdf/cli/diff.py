@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from iccbrdf.calc import listing
-from iccbrdf.cli.options import emit, json_option
+from iccbrdf.cli.options import CHECK_FAILED, emit, json_option
 from iccbrdf.icc import read_profile
 from iccbrdf.icc.compare import Difference, compare
 
@@ -63,7 +63,7 @@ def command(ctx: click.Context, a: Path, b: Path, samples: int | None, as_json: 
         if agreed.not_finite:
             lines.append(f"  {agreed.not_finite} of them have outputs that are not finite, and are left out")
     emit(as_json, "iccbrdf.diff/1", result, "\n".join(lines))
-    ctx.exit(1 if found else 0)
+    ctx.exit(CHECK_FAILED if found else 0)
 
 
 def _lines(difference: Difference) -> Iterator[str]:

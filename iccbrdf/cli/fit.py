@@ -15,7 +15,7 @@ from iccbrdf.brdf.fit_problem import Objective
 from iccbrdf.brdf.geometry import Array
 from iccbrdf.brdf.models import MODELS
 from iccbrdf.brdf.primaries import REFRACTIVE_INDEX, Primaries, Primary, write_primaries
-from iccbrdf.cli.options import FiniteRange, emit, force_option, json_option, name_list
+from iccbrdf.cli.options import CHECK_FAILED, FiniteRange, emit, force_option, json_option, name_list
 from iccbrdf.errors import InputError, UsageError, nearest
 from iccbrdf.files import check_target
 from iccbrdf.measure import (
@@ -167,7 +167,7 @@ def command(
     ]
     emit(as_json, "iccbrdf.fit/1", answer, "\n".join(text))
     if strict and flagged:
-        click.get_current_context().exit(1)
+        click.get_current_context().exit(CHECK_FAILED)
 
 
 def _refractive_index(text: str | None) -> float | Literal["free"]:

@@ -15,6 +15,9 @@ from iccbrdf.scene import environment as environment
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+CHECK_FAILED = 1
+"""Exit code: a check that was asked for failed."""
+
 
 class FiniteRange(click.FloatRange):
     """A finite number within bounds: click's own range lets nan pass, which is beyond no bound."""

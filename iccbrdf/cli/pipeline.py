@@ -7,14 +7,14 @@ writing overlap, and memory is that of some blocks, however large the image.
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+from iccbrdf.cli.progress import progress
 from iccbrdf.cmm import Tally, Transform, standard_XYZ
 from iccbrdf.errors import InputError, UsageError, nearest
 from iccbrdf.files import check_target
@@ -145,7 +145,7 @@ def run(
         sinks = [
             stack.enter_context(_open(output, source, transform, overwrite, workers)) for output in outputs
         ]
-        advance = stack.enter_context(_progress(source, label))
+        advance = stack.enter_context(progress(label))
 
         def work(place: Place) -> _Worked:
             block, not_finite_in = admitted(source.read(place), nonfinite, label)
@@ -173,7 +173,7 @@ def run(
             done.not_finite_out += worked.not_finite_out
             done.kinds += worked.kinds
             done.beyond_slopes += worked.beyond_slopes
-            advance(worked.pixels)
+            advance(worked.pixels, source.height * source.width)
 
         with in_order(workers, take) as submit:
             for place in source.places():
@@ -263,21 +263,6 @@ def open_image(path: Path, samples: Samples | None) -> AbstractContextManager[Im
 
         return open_exr(path, samples)
     return open_tiff(path, samples)
-
-
-@contextmanager
-def _progress(source: ImageSource, label: str) -> Iterator[Callable[[int], None]]:
-    """A progress bar where stderr is a terminal; gives what is to be told the pixels that are done."""
-    if not sys.stderr.isatty():
-        yield lambda pixels: None
-        return
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(escape(label), total=source.height * source.width)
-        yield lambda pixels: bar.advance(task, pixels)
 
 
 def arranged_channels(

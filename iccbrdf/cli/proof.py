@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
-from iccbrdf.cli.options import emit, force_option, json_option
+from iccbrdf.cli.options import CHECK_FAILED, emit, force_option, json_option
+from iccbrdf.cli.progress import progress
 from iccbrdf.errors import IccBrdfError, UsageError
 from iccbrdf.proof import values
 from iccbrdf.proof.job import SETTINGS, Job, make_job, read_job
@@ -19,7 +18,6 @@ from iccbrdf.proof.job import SETTINGS, Job, make_job, read_job
 F = TypeVar("F", bound=Callable[..., Any])
 
 JOB_SUFFIX = ".toml"
-CHECK_FAILED = 1
 
 EPILOG = """
 \b
@@ -129,23 +127,8 @@ def _allowed(job: Job) -> float:
 def _made(job: Job, workers: int, force: bool) -> dict[str, Any]:
     from iccbrdf.proof.make import make_proof
 
-    with _progress(job.image.name) as advance:
+    with progress(job.image.name) as advance:
         return make_proof(job, overwrite=force, workers=workers, advance=advance)
-
-
-@contextmanager
-def _progress(label: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar where stderr is a terminal; gives what is to be told pixels, done and of how many."""
-    if not sys.stderr.isatty():
-        yield lambda pixels, total: None
-        return
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(escape(label), total=None)
-        yield lambda pixels, total: bar.update(task, total=total, advance=pixels)
 
 
 def _lines(source: Path, log: dict[str, Any]) -> Iterator[str]:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import click
 
-from iccbrdf.cli.options import emit, json_option
+from iccbrdf.cli.options import CHECK_FAILED, emit, json_option
 from iccbrdf.errors import nearest
 from iccbrdf.files import read_whole
 from iccbrdf.icc.profile import MAX_BYTES
@@ -119,4 +119,4 @@ def command(
         "pair": pair and pair.to_dict(),
     }
     emit(as_json, "iccbrdf.validate/1", result, "\n".join(line for r in everything for line in r.lines()))
-    ctx.exit(0 if passed else 1)
+    ctx.exit(0 if passed else CHECK_FAILED)

@@ -27,7 +27,7 @@ from iccbrdf.images.showing import finite
 from iccbrdf.planning import Planning, ScenePlan
 from iccbrdf.report.cost_runs import Ready, make_ready
 from iccbrdf.report.cost_scene import PIXELS, REGIONS, CostScene, Tiles, sample_scene
-from iccbrdf.report.cost_ways import PLAIN, Way, ways
+from iccbrdf.report.cost_ways import Way, ways
 
 Statistic = Literal["mean", "p95", "max"]
 STATISTICS: tuple[Statistic, ...] = ("mean", "p95", "max")
@@ -334,7 +334,7 @@ def _backends(scene: CostScene, exact: Array, names: Sequence[str], runs: int) -
         return ()
     count = max(1, _BACKEND_PIXELS // scene.tiles[0, ..., 0].size)
     tiles, white = scene.tiles[:count], scene.recipe.primaries.white
-    profiles = make_ready(PLAIN, scene, _no_plan).profiles
+    profiles = [scene.mid, scene.pair.mvis]
     works: dict[str, Callable[[], Any]] = {}
     for name in names:
         try:
@@ -353,10 +353,6 @@ def _backends(scene: CostScene, exact: Array, names: Sequence[str], runs: int) -
         )
         for (name, XYZ), took in zip(found.items(), times, strict=True)
     )
-
-
-def _no_plan(tolerance: float) -> ScenePlan:
-    raise UsageError("the plain way needs no plan")
 
 
 def pareto(costs: Sequence[Cost], statistic: Statistic = "max") -> tuple[Cost, ...]:

@@ -272,7 +272,7 @@ def _table_mid(grid: int, scene: CostScene) -> Profile:
 
 def _with_roughness(primaries: Primaries, model: str) -> Primaries:
     """The primaries as those of a model with another number of roughnesses: one for all, or that of Y."""
-    columns = _columns(MODELS[primaries.model].channels, model)
+    columns = _places(MODELS[primaries.model].channels, MODELS[model].channels)
     entries = [
         replace(primary, parameters=tuple(primary.parameters[i] for i in columns))
         for primary in primaries.primaries
@@ -287,10 +287,6 @@ def _roughness_columns(names: Sequence[str], model: str) -> tuple[tuple[str, ...
     normals = [name for name in names if name in NORMAL]
     places = [*_places(names, parameters), *(names.index(name) for name in normals)]
     return (*parameters, *normals), places
-
-
-def _columns(names: Sequence[str], model: str) -> list[int]:
-    return _places(names, MODELS[model].channels)
 
 
 def _places(names: Sequence[str], wanted: Sequence[str]) -> list[int]:
