@@ -27,7 +27,7 @@ from iccbrdf.errors import (
 from iccbrdf.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from iccbrdf.cmm import Transform, link
+    from iccbrdf.cmm import Transform, link, named_colours
     from iccbrdf.icc import Profile, read_profile, write_profile
 
 __version__ = "0.1.0"
@@ -36,6 +36,7 @@ _LAZY = {
     "Profile": "iccbrdf.icc",
     "Transform": "iccbrdf.cmm",
     "link": "iccbrdf.cmm",
+    "named_colours": "iccbrdf.cmm",
     "read_profile": "iccbrdf.icc",
     "write_profile": "iccbrdf.icc",
 }
@@ -56,6 +57,7 @@ __all__ = [
     "VariableError",
     "__version__",
     "link",
+    "named_colours",
     "read_profile",
     "write_profile",
 ]

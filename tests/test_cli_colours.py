@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from iccbrdf.cli import COMMANDS
 from iccbrdf.icc import (
     Header,
     Member,
@@ -16,13 +15,6 @@ from iccbrdf.icc import (
     Utf8,
     write_profile,
 )
-
-
-@pytest.fixture(autouse=True)
-def _listed(monkeypatch):
-    monkeypatch.setitem(
-        COMMANDS, "colours", "Show named colours, and what a chain of profiles makes of them."
-    )
 
 
 def colours(*values):

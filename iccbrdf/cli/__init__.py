@@ -25,6 +25,7 @@ COMMANDS = {
     "view": "Make a page in which a proof is relit in a browser.",
     "cost": "Show what accuracy costs in time on an image of yours.",
     "dump": "Show what a profile holds.",
+    "colours": "Show named colours, and what a chain of profiles makes of them.",
     "validate": "Check whether profiles are sound.",
     "diff": "Show what differs between two profiles.",
     "xml": "Write a profile as XML.",
