@@ -8,7 +8,6 @@ from typing import Any, Literal
 import click
 
 from iccbrdf import images
-from iccbrdf.brdf.models import NORMAL
 from iccbrdf.build import image_link, last_slope
 from iccbrdf.cli.options import (
     backend_option,
@@ -24,12 +23,13 @@ from iccbrdf.cli.pipeline import (
     EXR_SUFFIX,
     Output,
     arranged_channels,
+    check_decoded,
     check_outputs,
     open_image,
     run,
     run_on_cluster,
 )
-from iccbrdf.cmm import MAX_COST, Transform, link
+from iccbrdf.cmm import MAX_COST, link
 from iccbrdf.cmm.effects import SUBSTITUTES
 from iccbrdf.errors import UsageError
 from iccbrdf.icc import Profile, read_profile
@@ -108,19 +108,6 @@ def _recompiled(
     chain, known = with_effects(chain, asked)
     rest = effects if isinstance(effects, str) else [name for name in effects if name not in known]
     return chain, rest, [name for name in without if name not in known]
-
-
-def _check_decoded(first: Profile, source: ImageSource, transform: Transform) -> None:
-    """Refuse encoded normals where nothing decodes them, for the picture would be a wrong one."""
-    if (
-        first.header.device_class == "mvis"
-        and source.samples == "device"
-        and not {*NORMAL}.isdisjoint(transform.channels_in)
-    ):
-        raise UsageError(
-            f"the image holds device values, and {first.source} takes real ones: begin with the MID "
-            "(-p MID -p MVIS), or say --samples real where a float image holds these"
-        )
 
 
 @click.command("apply", epilog=EPILOG)
@@ -263,7 +250,7 @@ def command(
         names = arranged_channels(source, transform.channels_in, declared)
         if names is not None:
             transform = link(chain, channels=names, **settings)
-        _check_decoded(chain[0], source, transform)
+        check_decoded(chain[0], source, transform.channels_in)
         common: dict[str, Any] = {
             "overwrite": force,
             "last_slope": last_slope(chain[0]),

@@ -119,16 +119,16 @@ def command(
         raise UsageError("--budget and --time are two limits: give one of them")
     if budget is None and ns is None:
         budget = BUDGET
-    make_folder(folder)
-    targets = {name: folder / name for name in ("cost.json", "cost.md", "cost.png", "cost_errors.png")}
-    for target in targets.values():
-        check_target(target, overwrite=force)
     recipe = Recipe(
         read_primaries(primaries),
         read_slopes(slopes) if slopes is not None else None,
         interpolation,
         slope_method,
     )
+    make_folder(folder)
+    targets = {name: folder / name for name in ("cost.json", "cost.md", "cost.png", "cost_errors.png")}
+    for target in targets.values():
+        check_target(target, overwrite=force)
     declared = name_list(channels) if channels is not None else None
     with open_image(image, samples) as source:
         planning = Planning(source, recipe, declared)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+from iccbrdf.brdf.models import NORMAL
 from iccbrdf.cli.progress import progress
 from iccbrdf.cmm import Tally, Transform, standard_XYZ
 from iccbrdf.errors import InputError, UsageError, nearest
@@ -299,3 +300,25 @@ def arranged_channels(
         if declared.count(name) > 1:
             raise UsageError(f"--channels: {name!r} comes twice")
     return declared
+
+
+def check_decoded(first: Profile, source: ImageSource, names: Sequence[str]) -> None:
+    """Refuse encoded normals where nothing decodes them, for the picture would be a wrong one.
+
+    Parameters
+    ----------
+    first
+        The first profile of the chain.
+    names
+        Of the image's channels.
+
+    Raises
+    ------
+    UsageError
+        The chain begins with the MVIS, and the image holds device values, normals among them.
+    """
+    if first.header.device_class == "mvis" and source.samples == "device" and not {*NORMAL}.isdisjoint(names):
+        raise UsageError(
+            f"the image holds device values, and {first.source} takes real ones: begin with the MID "
+            "(-p MID -p MVIS), or say --samples real where a float image holds these"
+        )

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from iccbrdf.cli.options import emit, environment, force_option, json_option, name_list, scene_options
-from iccbrdf.cli.pipeline import arranged_channels
+from iccbrdf.cli.pipeline import arranged_channels, check_decoded
 from iccbrdf.errors import UsageError
 from iccbrdf.files import atomic_output, check_target
 from iccbrdf.icc import Profile, read_profile
@@ -124,4 +124,5 @@ def _names(source: ImageSource, first: Profile, channels: str | None) -> tuple[s
     own = stages([first], "relative")[0].source.names
     declared = name_list(channels) if channels is not None else None
     found = arranged_channels(source, own, declared)
+    check_decoded(first, source, own if found is None else found)
     return None if found is None else tuple(found)
