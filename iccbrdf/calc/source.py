@@ -31,7 +31,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, TypeAlias
 
 from lark import Lark, Token, Transformer, UnexpectedCharacters, UnexpectedToken, v_args
@@ -253,9 +253,10 @@ class Template:
                 pending.extend(reversed(statement.then + statement.otherwise))
 
 
+@lru_cache(maxsize=16)
 def parse(text: str, filename: str) -> Template:
     """
-    Return the syntax tree of a template.
+    Return the syntax tree of a template; the last ones are kept, since builds take the same ones.
 
     Raises
     ------
