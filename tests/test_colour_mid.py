@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import iccdev
 import numpy as np
@@ -25,7 +26,6 @@ from iccbrdf.errors import InputError, UsageError
 from iccbrdf.images import Block, create_tiff, open_tiff
 
 FOLDER = ROOT / "profiles" / "fogra39_gloss"
-PRIMARIES = read_primaries(FOLDER / "primaries.json")
 SLOPES = read_slopes(FOLDER / "slopes.json")
 # In steps of 1/1024 the differences of W and B, which a program holds, are float32 numbers too.
 BINARY_SLOPES = replace(
@@ -57,6 +57,9 @@ def in_float32(primaries: Primaries) -> Primaries:
     return replace(primaries, primaries=entries, white=tuple(rounded(primaries.white)))
 
 
+PRIMARIES = in_float32(read_primaries(FOLDER / "primaries.json"))
+
+
 def colours(count: int, seed: int) -> np.ndarray:
     """XYZ within the gamut: random mixtures of the primaries, as float32 device values hold them."""
     rng = np.random.default_rng(seed)
@@ -65,8 +68,7 @@ def colours(count: int, seed: int) -> np.ndarray:
 
 def normals(count: int, seed: int, steepest: float = 70) -> np.ndarray:
     rng = np.random.default_rng(seed)
-    tilt, azimuth = rng.uniform(0, steepest, count), rng.uniform(0, 360, count)
-    return np.stack([direction(t, a) for t, a in zip(tilt, azimuth, strict=True)])
+    return direction(rng.uniform(0, steepest, count), rng.uniform(0, 360, count))
 
 
 def device(XYZ: np.ndarray, n: np.ndarray) -> np.ndarray:
@@ -80,11 +82,28 @@ def real(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return wide[:, :3] * scale, 2 * wide[:, 3:] - 1
 
 
-def colour_mid(interpolation: str, slope_method: str | None, primaries: Primaries = PRIMARIES):
+def colour_mid(interpolation: str, slope_method: str | None, primaries: Primaries):
     slopes = None if slope_method is None else BINARY_SLOPES
     return build_colour_mid(
         primaries, interpolation=interpolation, slopes=slopes, slope_method=slope_method or "affine"
     )
+
+
+@cache
+def of_the_print(interpolation: str, slope_method: str | None):
+    """The colour MID of the primaries, built once."""
+    return colour_mid(interpolation, slope_method, PRIMARIES)
+
+
+@cache
+def closing(interpolation: str):
+    """Of primaries whose kd is their XYZ the colour MID, and the MVIS of the diffuse part."""
+    entries = tuple(
+        replace(entry, parameters=(*entry.XYZ, *entry.parameters[3:])) for entry in PRIMARIES.primaries
+    )
+    primaries = replace(PRIMARIES, primaries=entries)
+    mvis = build_pair(primaries, without=["specular"]).mvis
+    return colour_mid(interpolation, "affine", primaries).mid, mvis
 
 
 def on_slope(values, slope_method) -> tuple[np.ndarray, np.ndarray]:
@@ -127,10 +146,9 @@ def unambiguous(values, slope_method, primaries) -> np.ndarray:
 @pytest.mark.parametrize("slope_method", SLOPE_METHODS)
 @pytest.mark.parametrize("interpolation", METHODS)
 def test_float64_equals_the_reference(interpolation, slope_method):
-    primaries = in_float32(PRIMARIES)
     values = device(colours(3000, 1), normals(3000, 2))
-    transform = iccbrdf.link([colour_mid(interpolation, slope_method, primaries).mid], dtype="float64")
-    expected = reference(values, interpolation, slope_method, primaries)
+    transform = iccbrdf.link([of_the_print(interpolation, slope_method).mid], dtype="float64")
+    expected = reference(values, interpolation, slope_method, PRIMARIES)
     error = np.abs(transform(values) - expected) / np.maximum(np.abs(expected), 1e-3)
     assert error.max() < 1e-10
 
@@ -157,15 +175,14 @@ def test_every_model(interpolation, model):
 @pytest.mark.parametrize("slope_method", SLOPE_METHODS)
 @pytest.mark.parametrize("interpolation", METHODS)
 def test_float32(interpolation, slope_method):
-    primaries = in_float32(PRIMARIES)
     values = device(colours(5000, 6), normals(5000, 7))
-    found = iccbrdf.link([colour_mid(interpolation, slope_method, primaries).mid])(values)
-    expected = reference(values, interpolation, slope_method, primaries)
+    found = iccbrdf.link([of_the_print(interpolation, slope_method).mid])(values)
+    expected = reference(values, interpolation, slope_method, PRIMARIES)
     used = np.ones(len(values), bool)
     if interpolation == "published":
-        used = unambiguous(values, slope_method, primaries)
+        used = unambiguous(values, slope_method, PRIMARIES)
         assert used.mean() > 0.98
-    kd = [XYZ_to_Lab(np.maximum(p[used, :3], 1e-6), primaries.white) for p in (found, expected)]
+    kd = [XYZ_to_Lab(np.maximum(p[used, :3], 1e-6), PRIMARIES.white) for p in (found, expected)]
     assert delta_E_CIE2000(*kd).max() < 1e-3
     assert np.abs(np.log(found[used, 3:7] / expected[used, 3:7])).max() < 1e-3
     assert np.abs(found[:, 7:] - expected[:, 7:]).max() < 1e-6
@@ -184,7 +201,7 @@ def iccdev_run(tmp_path, profiles, values) -> np.ndarray:
 @pytest.mark.parametrize("interpolation", METHODS)
 def test_iccdev_agrees_on_the_mid(interpolation, slope_method, tmp_path):
     values = device(colours(5000, 8), normals(5000, 9))
-    mid = colour_mid(interpolation, slope_method).mid
+    mid = of_the_print(interpolation, slope_method).mid
     assert iccdev.validate_profile(mid.to_bytes()).status == iccdev.ValidationStatus.OK
     found = iccbrdf.link([mid])(values)
     expected = iccdev_run(tmp_path, [mid], values)
@@ -199,7 +216,7 @@ def test_iccdev_agrees_on_the_mid(interpolation, slope_method, tmp_path):
 @pytest.mark.parametrize("interpolation", METHODS)
 def test_iccdev_agrees_on_the_whole_proof(interpolation, tmp_path):
     values = device(colours(5000, 10), normals(5000, 11, steepest=60))
-    chain = [colour_mid(interpolation, "affine").mid, build_pair(PRIMARIES).mvis]
+    chain = [of_the_print(interpolation, "affine").mid, build_pair(PRIMARIES).mvis]
     found = iccbrdf.link(chain)(values)
     expected = iccdev_run(tmp_path, chain, values) * 65535 / 32768
     error = np.abs(found - expected) / np.maximum(np.abs(expected), 1e-2)
@@ -209,7 +226,7 @@ def test_iccdev_agrees_on_the_whole_proof(interpolation, tmp_path):
 @pytest.mark.parametrize("interpolation", METHODS)
 def test_two_steps_equal_one(interpolation):
     """The BRDF image in the binding MID's encoding, then binding MID and MVIS, is the same proof."""
-    built, pair = colour_mid(interpolation, "affine"), build_pair(PRIMARIES)
+    built, pair = of_the_print(interpolation, "affine"), build_pair(PRIMARIES)
     values = device(colours(2000, 12), normals(2000, 13, steepest=60))
     to_image = iccbrdf.link([built.mid, image_link(built.mid)])
     assert to_image.channels_out == iccbrdf.link([pair.mid]).channels_in
@@ -230,12 +247,7 @@ def test_closure_of_the_diffuse_part(interpolation, angle):
 
     On a slope, in its own frame, it is the colour adjusted to the slope.
     """
-    entries = tuple(
-        replace(entry, parameters=(*entry.XYZ, *entry.parameters[3:])) for entry in PRIMARIES.primaries
-    )
-    primaries = replace(PRIMARIES, primaries=entries)
-    mid = colour_mid(interpolation, "affine", primaries).mid
-    mvis = build_pair(primaries, without=["specular"]).mvis
+    mid, mvis = closing(interpolation)
     env = dict(zip(("litX", "litY", "litZ"), direction(angle, 30), strict=True))
     view = direction(abs(angle - 45), 30 if angle >= 45 else 210)
     env |= dict(zip(("vueX", "vueY", "vueZ"), view, strict=True)) if "vueX" in _variables(mvis) else {}
@@ -252,7 +264,7 @@ def _variables(profile) -> tuple[str, ...]:
 
 @pytest.mark.parametrize("interpolation", METHODS)
 def test_nodes_give_their_parameters(interpolation):
-    mid = colour_mid(interpolation, None).mid
+    mid = of_the_print(interpolation, None).mid
     n = np.broadcast_to([0.0, 0.0, 1.0], (len(PRIMARIES.primaries), 3))
     real_values = np.concatenate([PRIMARIES.XYZ, n], axis=1).astype(np.float32)
     found = iccbrdf.link([mid], samples="real")(real_values)
@@ -269,7 +281,7 @@ def test_hard_input_is_finite(interpolation, slope_method):
     n = rng.uniform(-1, 1, XYZ.shape)
     n[:3] = ((0, 0, 0), (0, 0, -1), (0, 0, 4))
     values = np.concatenate([XYZ, n], axis=1).astype(np.float32)
-    mid = colour_mid(interpolation, slope_method).mid
+    mid = of_the_print(interpolation, slope_method).mid
     for dtype in ("float32", "float64"):
         out = iccbrdf.link([mid], samples="real", dtype=dtype)(values)
         assert np.isfinite(out).all()
@@ -279,7 +291,7 @@ def test_hard_input_is_finite(interpolation, slope_method):
 
 def test_operators():
     """State the cost: a rise is to be seen, not to be found out later."""
-    nine = {method: colour_mid(method, "affine").compiled.executed for method in METHODS}
+    nine = {method: of_the_print(method, "affine").compiled.executed for method in METHODS}
     assert nine["smooth"] < 300
     assert nine["published"] < 2700
 
