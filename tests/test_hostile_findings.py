@@ -4,6 +4,7 @@ import io
 import json
 import os
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,15 +21,22 @@ from iccbrdf.calc.program import Op
 from iccbrdf.cmm.environment import checked_environment
 from iccbrdf.errors import InputError, LimitError, ProfileError, UnsupportedError, VariableError
 from iccbrdf.icc import (
+    TAGS,
+    XYZ,
     Calculator,
     Clut,
+    Curve,
     ExtendedClut,
     MultiProcess,
     NumberArray,
     Profile,
+    TagArray,
+    Utf8,
     describe,
     reader,
+    text,
 )
+from iccbrdf.icc.compare import compare
 from iccbrdf.icc.layout import Record
 from iccbrdf.icc.xml import node, profile_from_xml
 from iccbrdf.images import open_tiff
@@ -39,6 +47,7 @@ from iccbrdf.proof import job
 from iccbrdf.proof.colour_in import ColourIn
 from iccbrdf.proof.log import earlier
 from iccbrdf.resources import folder
+from iccbrdf.validate import validate
 from iccbrdf.viewer import read_folder
 
 PRIMARIES = folder("profiles") / "fogra39_gloss" / "primaries.json"
@@ -146,6 +155,80 @@ def test_files_have_a_size_at_most(tmp_path, monkeypatch):
         monkeypatch.setattr(module, "MAX_BYTES", path.stat().st_size - 1)
         with pytest.raises(LimitError, match=f"{path.name}: larger than the limit of "):
             read(path)
+
+
+def test_a_part_in_many_places_counts_each_time(monkeypatch):
+    """To describe it, and to encode its text, took what no memory holds."""
+    array = TagArray("utf8", (Utf8("x" * 4000),) * 1000)
+    record = b"enUS" + struct.pack(">II", 4000, 16 + 12 * 1000)
+    texts = b"mluc\0\0\0\0" + struct.pack(">II", 1000, 12) + record * 1000 + b"\0x" * 2000
+    monkeypatch.setattr(reader, "MAX_NUMBERS", 1_000_999)
+    assert len(TAGS.read(reader.Reader(texts, "a.icc", "tag desc")).texts) == 1000
+    monkeypatch.setattr(reader, "MAX_NUMBERS", 999_999)
+    for data in (array.to_bytes(), texts):
+        with pytest.raises(LimitError, match="more numbers in one tag than the limit of 999999"):
+            TAGS.read(reader.Reader(data, "a.icc", "tag desc"))
+    programs = MultiProcess.of(*(Calculator(1, 1, (Op("in", 0),) * 1000, ()),) * 263)
+    with pytest.raises(LimitError, match="more operations in one tag than the limit of 262144"):
+        TAGS.read(reader.Reader(programs.to_bytes(), "a.icc", "tag A2B0"))
+
+
+def test_all_tags_together_have_a_limit(monkeypatch):
+    """A thousand tags of as many parts as one may have took gigabytes."""
+    tags = {f"t{i:03}": TagArray("utf8", tuple(Utf8(f"{i} {j}") for j in range(20))) for i in range(5)}
+    data = device_profile("scnr", **tags).to_bytes()
+    monkeypatch.setattr(reader, "MAX_PARTS", 40)
+    profile = Profile.from_bytes(data)
+    for signature in ("t000", "t001", "t002", "t003", "t003"):
+        assert len(profile[signature].items) == 20
+    for _ in range(2):
+        with pytest.raises(LimitError, match=r"t004.*more parts in one profile than the limit of 80"):
+            profile["t004"]
+    assert [f.rule.id for f in validate(data).findings if "more parts" in f.message] == ["TAG-002"]
+
+
+def test_numbers_that_are_read_one_by_one_count_more(monkeypatch):
+    triples = device_profile("scnr", wtpt=XYZ(((1, 1, 1),) * 100), t000=Curve((7,) * 100)).to_bytes()
+    monkeypatch.setattr(reader, "MAX_NUMBERS", 3199)
+    for signature in ("wtpt", "t000"):
+        with pytest.raises(LimitError, match="more numbers in one tag than the limit of 3199"):
+            Profile.from_bytes(triples)[signature]
+
+
+def test_tags_that_overlap_are_examined_once():
+    """Each of a thousand tags might hold all of the file."""
+    rows = range(1024)
+    start = 132 + 12 * len(rows)
+    table = b"".join(struct.pack(">4sII", b"t%03x" % i, start + 4 * i, 99_000 - 4 * i) for i in rows)
+    body = (b"utf8" * 2).ljust(99_000, b"x")
+    head = replace(device_profile("scnr").header, size=start + len(body)).to_bytes()
+    data = head + struct.pack(">I", len(rows)) + table + body
+    with time_limit(5):
+        found = [f for f in validate(data).findings if f.rule.id == "TAG-002"]
+    assert len(found) >= 50
+    assert "overlap and hold more than the file" in found[0].message
+
+
+def test_what_is_shown_of_a_profile_has_a_limit(monkeypatch):
+    """Tags share their data, and each of them shows it."""
+    shared = Utf8("x" * 3000)
+    profile = device_profile("scnr", **{f"t{i:03}": shared for i in range(9)})
+    monkeypatch.setattr(text, "MAX_CHARACTERS", 10_000)
+    shown = describe(profile)
+    assert shown.count("x" * 3000) == 3
+    assert shown.count("not shown: with it there are more than 10000 characters") == 6
+
+
+def test_a_comparison_has_a_limit(monkeypatch):
+    """Tags that share their data are compared one by one."""
+    profiles = []
+    for character in "xy":
+        shared = Utf8(character * 3000)
+        profiles.append(device_profile("scnr", **{f"t{i:03}": shared for i in range(9)}))
+    assert len(compare(*profiles, listing=str)) == 9
+    monkeypatch.setattr("iccbrdf.icc.compare.MAX_WORK", 200_000)
+    with pytest.raises(LimitError, match="tag t005, text: to compare it and what is before it takes more"):
+        compare(*profiles, listing=str)
 
 
 def test_numbers_of_a_tag_have_a_limit(monkeypatch):

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from iccbrdf.calc.program import Op, Program
-from iccbrdf.errors import IccBrdfError
+from iccbrdf.errors import IccBrdfError, LimitError
 from iccbrdf.icc.layout import shown
 from iccbrdf.icc.packed import CompressedUtf8
 from iccbrdf.icc.profile import Profile
@@ -22,6 +22,13 @@ MAX_LINES = 5000
 """Programs and texts of more lines are not compared by these: a line diff takes quadratic time."""
 MAX_TEXT = 1 << 17
 """Bytes of a compressed text; longer ones are compared as they are."""
+MAX_WORK = 1 << 28
+"""Of a comparison, in numbers of arrays: parts that are shared are compared wherever they are."""
+
+_VALUE = 256
+"""What a value takes that is no array."""
+_ITEM: Mapping[type, int] = {tuple: 64, str: 4, bytes: 1}
+"""What each item takes of one that has several: an operation of a program is listed."""
 
 _COMPUTED = ("size", "profile_id")
 """Header fields that follow from the rest of the file."""
@@ -50,7 +57,7 @@ def compare(a: Profile, b: Profile, *, listing: Listing) -> list[Difference]:
     Size and profile ID, which follow from the rest, the order of the tags and the bytes between them do
     not count.  Programs are compared by the lines of `listing`, compressed texts by keys where they are JSON
     (as the source of a profile is) and else by lines.  A tag that cannot be decoded on either side is
-    compared by its bytes.
+    compared by its bytes.  Raises LimitError where that would take more than MAX_WORK.
     """
     return list(_Comparison(listing).profiles(a, b))
 
@@ -60,6 +67,13 @@ class _Comparison:
 
     def __init__(self, listing: Listing) -> None:
         self.listing = listing
+        self._left = MAX_WORK
+
+    def spend(self, work: int, place: str) -> None:
+        """Count what is done; LimitError where it gets too much."""
+        self._left -= work
+        if self._left < 0:
+            raise LimitError(f"{place}: to compare it and what is before it takes more than the limit")
 
     def profiles(self, a: Profile, b: Profile) -> Iterator[Difference]:
         for name in (f.name for f in fields(a.header) if f.name not in _COMPUTED):
@@ -67,11 +81,14 @@ class _Comparison:
         for signature in dict.fromkeys([*a, *b]):
             place = f"tag {shown(signature)}"
             if signature not in b:
-                yield Difference(place, "removed", f"{len(a.tag_data(signature))} bytes")
+                yield Difference(place, "removed", f"{a.tag_size(signature)} bytes")
             elif signature not in a:
-                yield Difference(place, "added", f"{len(b.tag_data(signature))} bytes")
-            elif a.tag_data(signature) != b.tag_data(signature):
-                yield from self.tags(a, b, signature, place)
+                yield Difference(place, "added", f"{b.tag_size(signature)} bytes")
+            else:
+                # Tags may share what they hold.
+                self.spend(a.tag_size(signature) + b.tag_size(signature), place)
+                if a.tag_data(signature) != b.tag_data(signature):
+                    yield from self.tags(a, b, signature, place)
 
     def tags(self, a: Profile, b: Profile, signature: str, place: str) -> Iterator[Difference]:
         try:
@@ -82,6 +99,7 @@ class _Comparison:
             yield from self.values(first, second, place)
 
     def values(self, a: Any, b: Any, place: str) -> Iterator[Difference]:
+        self.spend(_work(a) + _work(b), place)
         if type(a) is not type(b):
             yield Difference(place, "changed", f"{_kind(a)} -> {_kind(b)}")
         elif isinstance(a, np.ndarray):
@@ -166,6 +184,13 @@ class _Comparison:
             return ()
 
 
+def _work(value: Any) -> int:
+    """What a value takes, without the values in it."""
+    if isinstance(value, np.ndarray):
+        return _VALUE + int(value.size)
+    return _VALUE + (_ITEM[type(value)] * len(value) if type(value) in _ITEM else 0)
+
+
 def _diff(a: Sequence[str], b: Sequence[str]) -> tuple[str, ...]:
     if max(len(a), len(b)) > MAX_LINES:
         return ()
@@ -235,7 +260,9 @@ def _arrays(a: Any, b: Any, place: str, *, text: str = "") -> Iterator[Differenc
 def _bytes(a: bytes, b: bytes, place: str) -> Iterator[Difference]:
     if a == b:
         return
-    same = next((i for i, (p, q) in enumerate(zip(a, b, strict=False)) if p != q), min(len(a), len(b)))
+    common = min(len(a), len(b))
+    different = np.frombuffer(a, np.uint8)[:common] != np.frombuffer(b, np.uint8)[:common]
+    same = int(different.argmax()) if different.any() else common
     yield Difference(
         place, "changed", f"{len(a)} -> {len(b)} bytes, alike up to byte {same}", {"first_difference": same}
     )

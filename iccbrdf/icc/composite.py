@@ -117,6 +117,7 @@ class _Entries(FieldType):
 
     @staticmethod
     def _text(reader: Reader) -> str:
+        reader.count_bytes(reader.left)
         try:
             return bytes(reader.take(reader.left, "text")).decode("utf-16-be")
         except UnicodeDecodeError as error:

@@ -81,7 +81,9 @@ class Bytes(FieldType):
 
     def read(self, reader: Reader, name: str, seen: Seen) -> bytes:
         size = self.size(seen) if callable(self.size) else self.size
-        return bytes(reader.take(reader.left if size is None else size, name))
+        data = reader.take(reader.left if size is None else size, name)
+        reader.count_bytes(len(data))
+        return bytes(data)
 
     def write(self, out: bytearray, value: bytes, record: Any) -> None:
         out += value
@@ -107,6 +109,7 @@ class Text(FieldType):
 
     def decode(self, reader: Reader, data: bytes, name: str, at: int) -> str:
         """The text that `data`, read at window offset `at`, stands for."""
+        reader.count_bytes(len(data))
         try:
             return data.decode(self.encoding).rstrip("\0")
         except UnicodeDecodeError as error:
@@ -220,6 +223,10 @@ S15, U16_16 = Fixed16(signed=True), Fixed16(signed=False)
 SIGNATURE = Signature()
 
 
+_ONE_BY_ONE = 32
+"""Numbers of an array that take the memory and the time of one that is read for itself."""
+
+
 class Repeat(FieldType):
     """A tuple of `count` values of one type; without a count, as many as there are to the end."""
 
@@ -231,9 +238,12 @@ class Repeat(FieldType):
         if self.count is None:
             values = []
             while reader.left:
+                reader.count_numbers(_ONE_BY_ONE)
                 values.append(self.item.read(reader, name, seen))
             return tuple(values)
         count = self.count(seen) if callable(self.count) else self.count
+        # There is no use in counting what will not be found.
+        reader.count_numbers(_ONE_BY_ONE * min(count, reader.left))
         return tuple(self.item.read(reader, name, seen) for _ in range(count))
 
     def write(self, out: bytearray, value: Sequence[Any], record: Any) -> None:

@@ -9,12 +9,19 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
-from iccbrdf.errors import LimitError, ProfileError, UnsupportedError, UsageError, nearest
+from iccbrdf.errors import (
+    IccBrdfError,
+    LimitError,
+    ProfileError,
+    UnsupportedError,
+    UsageError,
+    nearest,
+)
 from iccbrdf.files import StrPath, atomic_output, read_whole
 from iccbrdf.icc.elements import MultiProcess
 from iccbrdf.icc.header import SIZE, Header, channel_count
 from iccbrdf.icc.layout import Record, shown
-from iccbrdf.icc.reader import Reader
+from iccbrdf.icc.reader import Budget, Reader
 from iccbrdf.icc.tags import TAGS
 
 MAX_BYTES = 1 << 28
@@ -40,19 +47,36 @@ class MissingTagError(ProfileError, KeyError):
 class _Stored:
     """The data of one tag or of several that share it, as it stands in a file."""
 
-    def __init__(self, data: bytes | memoryview, source: str, signature: str, offset: int) -> None:
+    def __init__(
+        self, data: bytes | memoryview, source: str, signature: str, offset: int, budget: Budget | None = None
+    ) -> None:
         self.data = data
         self.offset = offset
         self._source = source
         self._signature = signature
+        self._budget = budget or Budget()
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A memoryview does not pickle.
         return type(self), (bytes(self.data), self._source, self._signature, self.offset)
 
-    @cached_property
+    @property
     def value(self) -> Any:
-        return TAGS.read(Reader(self.data, self._source, f"tag {shown(self._signature)}", start=self.offset))
+        value, problem = self._outcome
+        if problem is not None:
+            raise problem
+        return value
+
+    @cached_property
+    def _outcome(self) -> tuple[Any, IccBrdfError | None]:
+        """The value, or the error about it: to read what is malformed again would spend the budget again."""
+        place, budget = f"tag {shown(self._signature)}", Budget(self._budget)
+        reader = Reader(self.data, self._source, place, start=self.offset, budget=budget)
+        try:
+            return TAGS.read(reader), None
+        except IccBrdfError as error:
+            # Without the frames of the reading, which hold its data.
+            return None, error.with_traceback(None)
 
 
 class _Made:
@@ -171,6 +195,10 @@ class Profile(Mapping[str, Any]):
         """The bytes of a tag as they are, or will be, in the file, its type signature included."""
         return bytes(self._tag(signature).data)
 
+    def tag_size(self, signature: str) -> int:
+        """How many bytes those are."""
+        return len(self._tag(signature).data)
+
     def tag_offset(self, signature: str) -> int | None:
         """Where the tag's data begins in the file that was read; None for a tag made in memory."""
         return self._tag(signature).offset
@@ -236,10 +264,11 @@ def _read_table(data: bytes, source: str) -> dict[str, _Stored | _Made]:
                 f"found tag {name!r} a second time, expected every signature once",
                 at=SIZE + 4 + _ENTRY.size * index,
             )
+    budget = Budget()
     stored = reader.parts(
         [(offset, size) for _, offset, size in entries],
         lambda index: f"tag {shown(names[index])}",
-        lambda part, index: _Stored(part.take(part.left, "data"), source, names[index], part.start),
+        lambda part, index: _Stored(part.take(part.left, "data"), source, names[index], part.start, budget),
     )
     return dict(zip(names, stored, strict=True))
 

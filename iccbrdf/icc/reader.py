@@ -16,16 +16,41 @@ MAX_OPERATIONS = 1 << 18
 """Of all calculator programs of one tag: each takes a hundred times its bytes when it is looked at."""
 
 MAX_NUMBERS = 1 << 26
-"""Of all tables and curves of one tag; each takes four bytes or eight, however small it is stored."""
+"""Of all tables and curves of one tag; each takes four bytes or eight, however small it is stored.
+
+Four bytes of text or of raw data count as one.
+"""
+
+MAX_LIKE_ONE_TAG = 2
+"""All tags of one profile together may hold so many times what a single one may."""
 
 
-class _Budget:
-    """How many parts, operations and numbers one tag has used up so far."""
+class Budget:
+    """How many parts, operations and numbers have been used up so far: of one tag, and of its profile.
 
-    def __init__(self) -> None:
-        self.spent = 0
+    A budget without `whole` is a profile's.
+    """
+
+    def __init__(self, whole: Budget | None = None) -> None:
+        self.parts = 0
         self.operations = 0
         self.numbers = 0
+        self._whole = whole
+
+    @property
+    def used(self) -> tuple[int, int, int]:
+        """All of them."""
+        return self.parts, self.operations, self.numbers
+
+    def spend(self, kind: str, count: int, limit: int) -> str | None:
+        """Add `count` of a kind; what is now beyond the limit of a tag or of a profile, if anything is."""
+        spent = getattr(self, kind) + count
+        setattr(self, kind, spent)
+        if self._whole is None:
+            return f"more {kind} in one profile than the limit of {limit}" if spent > limit else None
+        if spent > limit:
+            return f"more {kind} in one tag than the limit of {limit}"
+        return self._whole.spend(kind, count, MAX_LIKE_ONE_TAG * limit)
 
 
 class Reader:
@@ -49,7 +74,7 @@ class Reader:
         *,
         start: int = 0,
         depth: int = 0,
-        budget: _Budget | None = None,
+        budget: Budget | None = None,
     ) -> None:
         self._data = memoryview(data)
         self.source = source
@@ -57,7 +82,7 @@ class Reader:
         self.start = start
         self.position = 0
         self._depth = depth
-        self._budget = budget or _Budget()
+        self._budget = budget or Budget(Budget())
 
     def __len__(self) -> int:
         return len(self._data)
@@ -127,38 +152,46 @@ class Reader:
         proportion to the bytes.
         """
         self._check_disjoint(spans, label)
-        known: dict[tuple[int, int], tuple[Any, int]] = {}
+        known: dict[tuple[int, int], tuple[Any, tuple[int, ...]]] = {}
         values = []
         for index, span in enumerate(spans):
             if span in known:
                 value, weight = known[span]
-                self.count_parts(weight)
+                # Shared parts inside shared parts multiply: few bytes could stand for endless objects.
+                for count, more in zip(self._counters, weight, strict=True):
+                    count(more)
             else:
-                before = self._budget.spent
+                before = self._budget.used
                 self.count_parts(1)
                 value = read(self.part(*span, label(index)), index)
-                known[span] = value, self._budget.spent - before
+                weight = tuple(a - b for a, b in zip(self._budget.used, before, strict=True))
+                known[span] = value, weight
             values.append(value)
         return values
 
-    def count_parts(self, parts: int) -> None:
+    @property
+    def _counters(self) -> tuple[Callable[[int], None], ...]:
+        return self.count_parts, self.count_operations, self.count_numbers
+
+    def count_parts(self, count: int) -> None:
         """Account for parts that become objects; LimitError where they are too many."""
-        # Shared parts inside shared parts multiply: few bytes could stand for endless objects.
-        self._budget.spent += parts
-        if self._budget.spent > MAX_PARTS:
-            raise LimitError(f"{self.where}: more parts in one tag than the limit of {MAX_PARTS}")
+        self._count("parts", count, MAX_PARTS)
 
     def count_operations(self, count: int) -> None:
         """Account for the operations of a program that is to be read; LimitError where they are too many."""
-        self._budget.operations += count
-        if self._budget.operations > MAX_OPERATIONS:
-            raise LimitError(f"{self.where}: more operations in one tag than the limit of {MAX_OPERATIONS}")
+        self._count("operations", count, MAX_OPERATIONS)
 
     def count_numbers(self, count: int) -> None:
         """Account for numbers that are to be converted; LimitError where they are too many."""
-        self._budget.numbers += count
-        if self._budget.numbers > MAX_NUMBERS:
-            raise LimitError(f"{self.where}: more numbers in one tag than the limit of {MAX_NUMBERS}")
+        self._count("numbers", count, MAX_NUMBERS)
+
+    def count_bytes(self, count: int) -> None:
+        """Account for bytes that are kept as they are, or as text; LimitError where they are too many."""
+        self.count_numbers(count // 4)
+
+    def _count(self, kind: str, count: int, limit: int) -> None:
+        if problem := self._budget.spend(kind, count, limit):
+            raise LimitError(f"{self.where}: {problem}")
 
     def _check_disjoint(self, spans: Sequence[tuple[int, int]], label: Callable[[int], str]) -> None:
         first_index = {span: index for index, span in reversed(list(enumerate(spans)))}

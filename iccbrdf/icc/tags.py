@@ -170,6 +170,7 @@ class _LocalisedTexts(FieldType):
 
     @staticmethod
     def _text(reader: Reader, index: int) -> str:
+        reader.count_bytes(reader.left)
         try:
             return bytes(reader.take(reader.left, "text")).decode("utf-16-be")
         except UnicodeDecodeError as error:

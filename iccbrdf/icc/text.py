@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from iccbrdf.calc.program import Op, Program
-from iccbrdf.errors import IccBrdfError
+from iccbrdf.errors import IccBrdfError, LimitError
 from iccbrdf.icc.profile import Profile
 from iccbrdf.icc.sequence import EmbeddedProfile
 
@@ -20,6 +20,11 @@ Listing: TypeAlias = Callable[[Program], str]
 
 MAX_PROFILES = 16
 """Profiles inside tags that are shown, those inside of them counted too."""
+MAX_CHARACTERS = 1 << 24
+"""Of all that is shown of a profile, about: parts that are shared are shown wherever they stand."""
+
+_VALUE = 16
+"""Characters of a value that is no text."""
 
 
 def to_dict(profile: Profile, *, listing: Listing | None = None, longest: int = 64) -> dict[str, Any]:
@@ -27,7 +32,8 @@ def to_dict(profile: Profile, *, listing: Listing | None = None, longest: int = 
 
     Arrays and bytes with more than `longest` entries are summarised by shape, extremes and their beginning.
     Programs appear as the lines of `listing`, else as their number of operations.  A tag that cannot
-    be decoded has an `error`, as has a profile inside a tag, of which the first `MAX_PROFILES` are shown.
+    be decoded has an `error`, as has a profile inside a tag, of which the first `MAX_PROFILES` are shown,
+    and a tag with which more than `MAX_CHARACTERS` would be shown.
     What no JSON number can be is text: "NaN", "Infinity", "-Infinity".
     """
     return _Plain(listing, longest).profile(profile)
@@ -45,6 +51,14 @@ class _Plain:
         self.listing = listing
         self.longest = longest
         self._profiles_left = MAX_PROFILES
+        self._left = MAX_CHARACTERS
+
+    def spend(self, characters: int) -> None:
+        """Count what is shown; LimitError where it gets too much."""
+        self._left -= characters
+        if self._left < 0:
+            self._left = 0
+            raise LimitError(f"not shown: with it there are more than {MAX_CHARACTERS} characters")
 
     def profile(self, profile: Profile) -> dict[str, Any]:
         return {
@@ -63,7 +77,7 @@ class _Plain:
             return {"profile": {"error": str(error)}}
 
     def tag(self, profile: Profile, signature: str) -> dict[str, Any]:
-        where = {"offset": profile.tag_offset(signature), "size": len(profile.tag_data(signature))}
+        where = {"offset": profile.tag_offset(signature), "size": profile.tag_size(signature)}
         try:
             return where | self.record(profile[signature])
         except IccBrdfError as error:
@@ -78,6 +92,7 @@ class _Plain:
         return head | {name: self.value(getattr(record, name)) for name in names} | inside
 
     def value(self, value: Any) -> Any:
+        self.spend(len(value) if isinstance(value, str) else _VALUE)
         if isinstance(value, np.ndarray):
             return self.array(value)
         if isinstance(value, bytes):
@@ -97,7 +112,9 @@ class _Plain:
     def program(self, program: Program) -> Any:
         if self.listing is None:
             return {"operations": len(program)}
-        return self.listing(program).splitlines()
+        text = self.listing(program)
+        self.spend(len(text))
+        return text.splitlines()
 
     def array(self, array: npt.NDArray[Any]) -> Any:
         if array.size <= self.longest:

@@ -12,7 +12,7 @@ from iccbrdf.errors import LimitError, ProfileError
 from iccbrdf.icc import ELEMENTS, Calculator, CurveSet, MultiProcess, SampledCalculatorCurve
 from iccbrdf.icc.fields import read_spans
 from iccbrdf.icc.layout import shown
-from iccbrdf.icc.reader import Reader
+from iccbrdf.icc.reader import Budget, Reader
 from iccbrdf.validate.findings import Finding, Place, finding, of_message
 
 _POSITIONS = {"mpet": 16, "calc": 16, "cvst": 12}
@@ -87,14 +87,16 @@ def located(process: MultiProcess, data: bytes, place: Place) -> tuple[Located, 
     )
 
 
-def read_leniently(data: bytes, place: Place, source: str) -> tuple[tuple[Located, ...], list[Finding]]:
+def read_leniently(
+    data: bytes, place: Place, source: str, budget: Budget
+) -> tuple[tuple[Located, ...], list[Finding]]:
     """The elements that can be read of a transform that cannot be read as a whole, and what hinders the rest.
 
-    Nothing of either for other types of tags.
+    Nothing of either for other types of tags.  `budget` is that of the profile.
     """
     if data[:4] != b"mpet":
         return (), []
-    reader = Reader(data, source, place.text, start=place.offset or 0)
+    reader = Reader(data, source, place.text, start=place.offset or 0, budget=Budget(budget))
     findings: list[Finding] = []
 
     def read(window: Reader, index: int) -> Any:

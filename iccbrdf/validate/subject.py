@@ -14,7 +14,7 @@ from iccbrdf.icc import TAGS, Header, MultiProcess, Unknown
 from iccbrdf.icc.header import SIZE
 from iccbrdf.icc.layout import shown
 from iccbrdf.icc.profile import MAX_TAGS
-from iccbrdf.icc.reader import Reader
+from iccbrdf.icc.reader import Budget, Reader
 from iccbrdf.validate.elements import Located, located, read_leniently
 from iccbrdf.validate.findings import Finding, Place, finding, of_message
 
@@ -160,20 +160,27 @@ def _read_table(subject: Subject) -> None:
 def _read_tags(subject: Subject) -> None:
     """Decode each tag whose bytes are in the file, those that are shared once."""
     known: dict[tuple[int, int], Tag] = {}
+    budget, left = Budget(), subject.end
     for entry in subject.entries:
         if entry.end > subject.end or entry.size < 8 or entry.signature in subject.tags:
             continue
         span = entry.offset, entry.size
         if span not in known:
-            known[span] = _read_tag(subject, entry)
+            left -= entry.size
+            if left < 0:
+                message = "found tags that overlap and hold more than the file together; it is not examined"
+                place = Place.of_tag(entry.signature, entry.offset)
+                subject.findings.append(finding("TAG-002", place, message))
+                continue
+            known[span] = _read_tag(subject, entry, budget)
         same = known[span]
         subject.tags[entry.signature] = Tag(entry, same.data, same.value, same.elements)
 
 
-def _read_tag(subject: Subject, entry: Entry) -> Tag:
+def _read_tag(subject: Subject, entry: Entry, budget: Budget) -> Tag:
     data = subject.data[entry.offset : entry.end]
     place = Place.of_tag(entry.signature, entry.offset)
-    reader = Reader(data, subject.source, place.text, start=entry.offset)
+    reader = Reader(data, subject.source, place.text, start=entry.offset, budget=Budget(budget))
     problem: Exception | None = None
     value: Any = None
     with warnings.catch_warnings(record=True) as caught:
@@ -190,7 +197,7 @@ def _read_tag(subject: Subject, entry: Entry) -> Tag:
     if isinstance(value, MultiProcess):
         elements = located(value, data, place)
     if problem is not None:
-        elements, found = read_leniently(data, place, subject.source)
+        elements, found = read_leniently(data, place, subject.source, budget)
         if not found:
             rule = "TAG-002" if isinstance(problem, LimitError) else "TAG-001"
             found = [of_message(rule, problem, place, subject.source)]

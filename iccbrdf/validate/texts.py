@@ -20,7 +20,8 @@ def check_texts(subject: Subject) -> Iterator[Finding]:
         if isinstance(tag.value, Mluc):
             yield from _localised(tag.value, tag.place)
         elif isinstance(tag.value, (PlainText, TextDescription, Utf8)):
-            yield from _text(tag.value.text, tag.place)
+            for rule, message in _problems(tag.value.text):
+                yield finding(rule, tag.place, message)
             if not isinstance(tag.value, Utf8) and not tag.value.text.isascii():
                 yield finding("TXT-005", tag.place, "found bytes above 127, expected none")
 
@@ -29,9 +30,12 @@ def _localised(value: Mluc, place: Place) -> Iterator[Finding]:
     if not value.texts:
         yield finding("TXT-001", place, "found no text in any language")
     seen: set[tuple[str, str]] = set()
+    # A long text may stand in thousands of records.
+    problems = {text: tuple(_problems(text)) for text in {item.text for item in value.texts}}
     for index, item in enumerate(value.texts):
         here = place.inner(f"text {index}", place.offset)
-        yield from _text(item.text, here)
+        for rule, message in problems[item.text]:
+            yield finding(rule, here, message)
         key = item.language, item.country
         if not _LANGUAGE.fullmatch(item.language) or not _COUNTRY.fullmatch(item.country):
             message = f"found {item.language!r}, {item.country!r}, expected such as 'en', 'GB'"
@@ -41,10 +45,10 @@ def _localised(value: Mluc, place: Place) -> Iterator[Finding]:
         seen.add(key)
 
 
-def _text(text: str, place: Place) -> Iterator[Finding]:
+def _problems(text: str) -> Iterator[tuple[str, str]]:
+    """What is wrong with a text: the rule and the message."""
     if not text.strip("\0 \t\r\n"):
-        yield finding("TXT-001", place, f"found {text!r}, expected a text")
+        yield "TXT-001", f"found {text[:20]!r}, expected a text"
     control = _CONTROL.search(text)
     if control is not None:
-        message = f"found {control[0]!r} after {control.start()} characters, expected text alone"
-        yield finding("TXT-003", place, message)
+        yield "TXT-003", f"found {control[0]!r} after {control.start()} characters, expected text alone"
