@@ -357,7 +357,7 @@ def test_bytes_are_the_same_every_time(tmp_path):
 
 @pytest.mark.parametrize("compression", [None, "deflate"])
 def test_bigtiff_when_it_needs_to_be(tmp_path, monkeypatch, compression):
-    monkeypatch.setattr("iccbrdf.images.tiff_writer._CLASSIC_BYTES", 1000)
+    monkeypatch.setattr("iccbrdf.images.tiff_writer.CLASSIC_BYTES", 1000)
     pixels = stored_pixels("float32")
     write_ours(tmp_path / "a.tif", pixels, "abcde", samples="device", compression=compression)
     assert (tmp_path / "a.tif").read_bytes()[:4] == b"II+\0"

@@ -56,7 +56,8 @@ Examples:
 @click.option("--primaries", required=True, type=click.Path(path_type=Path),
               help="The primaries file that the profiles are made of.")  # fmt: skip
 @click.option("--slopes", type=click.Path(path_type=Path), help="The slopes file, for an image of XYZ.")
-@click.option("--slope-method", type=click.Choice(SLOPE_METHODS), default="affine", show_default=True)
+@click.option("--slope-method", type=click.Choice(SLOPE_METHODS), default="affine", show_default=True,
+              help="From the flat colour to the one on a slope: continuous, or as published.")  # fmt: skip
 @click.option("--interpolation", type=click.Choice(INTERPOLATIONS), default="smooth", show_default=True,
               help="The method whose float64 result is exact, for an image of XYZ.")  # fmt: skip
 @click.option("--samples", type=click.Choice(("device", "real")),

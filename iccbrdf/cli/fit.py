@@ -45,10 +45,13 @@ _OBJECTIVES = {objective.replace(" ", "-"): objective for objective in get_args(
 _MAX_ANGLE = 70.0
 """Degrees.  Beyond, a few readings at grazing angles decide a fit that is bad everywhere else."""
 _STANDARD = "45:0"
+"""The geometry, incidence and view in degrees, whose XYZ stand for a colour."""
 _SAME_ANGLE = 0.5
+"""Degrees within which a measured geometry is the standard one."""
 _SCALES = (1.0, 1.25, 1.5, 2.0, 2.5, 4.0, 5.0, 10.0)
 """What a device value of 1 may stand for."""
 _DIGITS = 7
+"""Significant ones of the numbers that are written."""
 
 
 @click.command("fit", epilog=EPILOG)
@@ -62,10 +65,13 @@ _DIGITS = 7
 @click.option("--max-angle", type=FiniteRange(0, 90, min_open=True, max_open=True),
               default=_MAX_ANGLE, show_default=True,
               help="Leave out geometries further from the normal, in degrees.")  # fmt: skip
-@click.option("--model", type=click.Choice(list(MODELS)), default="brdf1", show_default=True)
+@click.option("--model", type=click.Choice(list(MODELS)), default="brdf1", show_default=True,
+              help="The reflection model that is fitted.")  # fmt: skip
 @click.option("--objective", type=click.Choice(list(_OBJECTIVES)), default="rms-CIEDE2000",
               show_default=True, help="What is minimised, over the geometries.")  # fmt: skip
-@click.option("--solver", type=click.Choice(list(SOLVERS)), default="least_squares", show_default=True)
+@click.option("--solver", type=click.Choice(list(SOLVERS)), default="least_squares", show_default=True,
+              help="Batched least squares, or Nelder-Mead as in the papers, which takes many times as "
+              "long.")  # fmt: skip
 @click.option("--compare", is_flag=True, help="Run the other solver too and show both.")
 @click.option("--starts", type=click.IntRange(1), default=STARTS, show_default=True,
               help="Starts made from the data.")  # fmt: skip

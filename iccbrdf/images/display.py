@@ -17,10 +17,9 @@ from iccbrdf.images.checks import not_finite_pixels
 from iccbrdf.images.little_cms import from_XYZ
 from iccbrdf.images.png import LONGEST_SIDE, PngWriter
 from iccbrdf.images.showing import Showing, finite, srgb
+from iccbrdf.images.tiff_writer import CLASSIC_BYTES
 
 _BAND_ROWS = 16
-# A classic TIFF counts bytes in 32 bits; the rest is room for the tags and the segment tables.
-_CLASSIC_BYTES = (1 << 32) - (1 << 25)
 
 
 def srgb_profile() -> bytes:
@@ -215,7 +214,7 @@ def create_rgb_tiff(
             dtype=f"<u{depth // 8}",
             photometric="rgb",
             iccprofile=showing.profile.to_bytes(),
-            bigtiff=size > _CLASSIC_BYTES,
+            bigtiff=size > CLASSIC_BYTES,
             byteorder="<",
             metadata=None,
             description=None,

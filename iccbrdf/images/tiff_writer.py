@@ -38,8 +38,8 @@ _COMPRESSORS = {"deflate": "zlib_encode", "zstd": "zstd_encode"}
 """Functions of imagecodecs, which loads the code of each when it is first asked for."""
 
 _STRIP_BYTES = 1 << 18
-# A classic TIFF counts bytes in 32 bits; the rest is room for the tags and the segment tables.
-_CLASSIC_BYTES = (1 << 32) - (1 << 25)
+CLASSIC_BYTES = (1 << 32) - (1 << 25)
+"""Of pixels in a TIFF that is no BigTIFF: it counts in 32 bits, and the rest is room for tags and tables."""
 
 
 class Encoded(NamedTuple):
@@ -250,7 +250,7 @@ def _in_place(
 ) -> Iterator[Put]:
     pixel_bytes = channels * dtype.itemsize
     size = grid.segments * grid.segment_height * grid.segment_width * pixel_bytes
-    with tifffile.TiffWriter(temporary, bigtiff=size > _CLASSIC_BYTES, byteorder="<") as writer:
+    with tifffile.TiffWriter(temporary, bigtiff=size > CLASSIC_BYTES, byteorder="<") as writer:
         writer.write(None, **tags)
     with tifffile.TiffFile(temporary) as laid_out:
         offsets = tuple(laid_out.pages[0].dataoffsets)
@@ -301,6 +301,6 @@ def _compressed(
                 spool.seek(offset)
                 yield spool.read(length)
 
-        big = spool.tell() > _CLASSIC_BYTES
+        big = spool.tell() > CLASSIC_BYTES
         with tifffile.TiffWriter(temporary, bigtiff=big, byteorder="<") as writer:
             writer.write(segments(), compression=compression, **tags)

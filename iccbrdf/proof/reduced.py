@@ -14,8 +14,10 @@ from iccbrdf.images.showing import Showing
 
 _MARGIN = 10
 _LABEL = 14
+"""Pixels around the pictures of a contact sheet, and of the height of a label."""
 _GREY, _BLACK = (205, 205, 205), (20, 20, 20)
 FRAME_MS = 100
+"""Milliseconds that a picture of an animation is shown."""
 
 
 class Sums(NamedTuple):

@@ -13,6 +13,7 @@ from iccbrdf.images.blocks import Array
 from iccbrdf.proof.job import Job
 
 _SAME_SHAPE = 0.01
+"""Relative difference of two aspect ratios that are taken as the same."""
 
 
 def read_normals(job: Job, height: int, width: int) -> Array | None:
