@@ -45,7 +45,8 @@ _TURN = 0.05
 """Seconds that a way may take in its turn; slower ones run on some of the tiles."""
 _AT_ONCE = 1 << 16
 """Pixels whose errors are computed at a time."""
-_BACKEND_PIXELS = 1 << 14
+BACKEND_PIXELS = 1 << 14
+"""On which the back ends are compared, as the interpreter is slow."""
 
 Errors32 = NDArray[np.float32]
 """CIEDE2000 by pixel."""
@@ -332,7 +333,7 @@ def _backends(scene: CostScene, exact: Array, names: Sequence[str], runs: int) -
     """The plain way by one back end after the other, on the first tiles."""
     if not names:
         return ()
-    count = max(1, _BACKEND_PIXELS // scene.tiles[0, ..., 0].size)
+    count = max(1, BACKEND_PIXELS // scene.tiles[0, ..., 0].size)
     tiles, white = scene.tiles[:count], scene.recipe.primaries.white
     profiles = [scene.mid, scene.pair.mvis]
     works: dict[str, Callable[[], Any]] = {}

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from iccbrdf.report.cost import CostReport, Statistic, pareto
+from iccbrdf.report.cost import BACKEND_PIXELS, CostReport, Statistic, pareto
 from iccbrdf.report.cost_scene import REGIONS
 
 COLUMNS = (
@@ -43,6 +43,8 @@ def notes(report: CostReport) -> Iterator[str]:
     yield "Errors are CIEDE2000 to it; * marks other answers, which differ and do not err"
     yield "Specular: normals whose angle to the half vector has a tangent up to m; near-specular: up to 3 m"
     yield f"Times: one thread, in memory, medians of {report.runs} runs in turns; + marks the Pareto front"
+    if report.backends:
+        yield f"Back ends: on {BACKEND_PIXELS} pixels at most, so few that the start of a run shows"
 
 
 def rows(report: CostReport, statistic: Statistic = "max") -> list[tuple[str, ...]]:
