@@ -142,6 +142,21 @@ def test_elements_and_attributes_of_xml_have_a_limit(monkeypatch):
             profile_from_xml(data.replace(b"<Header>", b"<Header>" + more))
 
 
+@pytest.mark.parametrize("encoding", ["UTF-7", "utf-7-imap", "JAVA", "C99", ""])
+def test_xml_in_encodings_that_hide_its_signs(encoding):
+    """Of "+ADw-a/+AD4-" nobody counted the sign that begins an element."""
+    head = b'<?xml version="1.0"  encoding = "%s"?>' % encoding.encode()
+    with pytest.raises(UnsupportedError, match=f"found the encoding '{encoding}', expected 'UTF-8'"):
+        profile_from_xml(head + b"<IccProfile>+ADw-a/+AD4-</IccProfile>")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "UTF-16", "ISO-8859-1", "windows-1252"])
+def test_xml_in_other_encodings(encoding):
+    text = seeds.xml()[0].decode()
+    declared = text.replace(text[: text.index("?>")], f'<?xml version="1.0" encoding="{encoding}"', 1)
+    assert profile_from_xml(declared.encode(encoding)) == profile_from_xml(text.encode())
+
+
 def test_files_have_a_size_at_most(tmp_path, monkeypatch):
     text, toml = tmp_path / "a.csv", tmp_path / "a.toml"
     text.write_text("patch,X\n" + "p,1\n" * 100)
@@ -184,7 +199,7 @@ def test_all_tags_together_have_a_limit(monkeypatch):
     for _ in range(2):
         with pytest.raises(LimitError, match=r"t004.*more parts in one profile than the limit of 80"):
             profile["t004"]
-    assert [f.rule.id for f in validate(data).findings if "more parts" in f.message] == ["TAG-002"]
+    assert {f.rule.id for f in validate(data).findings if "more parts" in f.message} == {"TAG-002"}
 
 
 def test_numbers_that_are_read_one_by_one_count_more(monkeypatch):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -28,6 +29,10 @@ MAX_MARKS = 1 << 21
 MAX_WARNINGS = 20
 MAX_TEXT = 10_000_000
 """Bytes in one piece of text: what libxml2 reads unless it is told to give up its limits."""
+
+_ENCODING = re.compile(rb"""[^>]{0,200}encoding\s*=\s*["']([^"'>]*)""")
+_PLAIN = re.compile(rb"utf-?8|utf-?16([bl]e)?|(us-)?ascii|iso-8859-\d+|(windows|cp)-?125\d", re.IGNORECASE)
+"""Encodings in which each sign `<` is a byte: others hide from MAX_MARKS what they hold."""
 
 _LIMIT_WORDS = ("huge", "excessive depth", "amplification", "entity reference loop", "resource limit")
 """How libxml2 says that a file is beyond its limits."""
@@ -90,13 +95,18 @@ class Document:
 def parse(data: bytes, source: str, document: Document) -> Node:
     """The root element of a document.
 
-    Raises InputError where it is no well-formed XML, ProfileError where it declares a document type, and
-    LimitError where it is larger or deeper than libxml2 reads without being told to.
+    Raises InputError where it is no well-formed XML, ProfileError where it declares a document type,
+    UnsupportedError where it is in a rare encoding, and LimitError where it is larger or deeper than libxml2
+    reads without being told to.
     """
     if len(data) > MAX_BYTES:
         raise LimitError(f"{source}: larger than the limit of {MAX_BYTES} bytes")
     if data.count(b"<") + data.count(b"=") > MAX_MARKS:
         raise LimitError(f"{source}: more elements and attributes than the limit of {MAX_MARKS}")
+    encoding = _ENCODING.match(data)
+    if encoding is not None and not _PLAIN.fullmatch(encoding[1]):
+        found = encoding[1].decode("ascii", "replace")
+        raise UnsupportedError(f"{source}:1: found the encoding {found!r}, expected 'UTF-8' or 'UTF-16'")
     parser = etree.XMLParser(
         resolve_entities=False,
         no_network=True,
