@@ -139,7 +139,15 @@ class Graph:
 
     def live(self) -> list[Node]:
         """The nodes that the outputs need, in order."""
-        return needed_by(self.outputs)
+        needed = bytearray(len(self.nodes))
+        for output in self.outputs:
+            needed[output.index] = True
+        # Each follows its arguments.
+        for node in reversed(self.nodes):
+            if needed[node.index]:
+                for argument in node.arguments:
+                    needed[argument.index] = True
+        return [node for node in self.nodes if needed[node.index]]
 
 
 def needed_by(nodes: Iterable[Node], skip: Callable[[Node], bool] = lambda node: False) -> list[Node]:
