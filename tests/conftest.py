@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+# Before NumPy is imported: each worker has one processor, and idle threads of BLAS would spin on it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from iccbrdf.cli import main
 from iccbrdf.icc import Profile

@@ -55,6 +55,7 @@ _NO_OFFSET = Span.of(np.zeros((3, 1)))
 
 Samples = NDArray[np.floating[Any]]
 
+
 @dataclass(frozen=True)
 class Decoder:
     """From the samples of an image to multiplex channels `names`, (height, width, n), in float64."""

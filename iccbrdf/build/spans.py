@@ -106,7 +106,6 @@ class Span:
         """This one where `condition` holds, `other` elsewhere."""
         return Span(np.where(condition, self.lo, other.lo), np.where(condition, self.hi, other.hi))
 
-
     def sum(self) -> Span:
         """Over the first axis."""
         low = np.add.reduce(self.lo)
