@@ -65,7 +65,7 @@ LAYOUTS = {
     "predicted deflate tiles": {"tile": (16, 32), "compression": "deflate", "predictor": True},
     "lzw strips": {"rowsperstrip": 1, "compression": "lzw"},
     "packbits strips": {"rowsperstrip": 3, "compression": "packbits"},
-    "lzma tiles": {"tile": (16, 16), "compression": "lzma"},
+    "lzma tiles": {"tile": (32, 16), "compression": "lzma"},
     "zstd tiles": {"tile": (32, 16), "compression": "zstd"},
 }
 
