@@ -29,6 +29,8 @@ MAX_NODES = 20_000
 """Nodes of a graph: a program that needs more is left to the interpreter, as it would compile for minutes."""
 MAX_MOVES = 1 << 19
 """Values moved while lifting: short programs can shuffle a deep stack for hours."""
+MOVES_A_TERM = 16
+"""A term of a matrix takes the time of so many moves, even where its nodes are there already."""
 SAMPLED_AT_A_TIME = 512
 """Operations of a calculator curve's samples that take the time of a move."""
 
@@ -137,13 +139,13 @@ def _row(lift: _Lift, row: Sequence[float], channels: Sequence[Node], offset: fl
     # A sum is the same without a term of 0 but for the sign of a zero, which adding an offset settles, +0
     # included: x + 0 is never -0.  Only 0 times infinity or NaN is more than that.
     droppable = lift.finite_inputs and not (offset == 0 and math.copysign(1.0, offset) < 0)
+    lift.count(MOVES_A_TERM * len(row))
     terms = [
         lift.op("mul", lift.number(factor), channel)
         for factor, channel in zip(row, channels, strict=True)
         if not (droppable and factor == 0 and channel.op == "input")
     ]
     lift.graph.assumes_finite |= len(terms) < len(row)
-    lift.count(len(terms))
     constant = lift.number(offset)
     if not terms:
         return constant
