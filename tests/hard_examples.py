@@ -44,19 +44,20 @@ class Promise(NamedTuple):
     least_cosine: float
     """Of light and viewer with the normal."""
     error: float
+    grows: bool = True
+    """Whether more is promised below that cosine, as one over the cosine, and not nothing.
+
+    Directions of length 1 in float32 are uncertain by 1e-7.  That is a relative error of 1e-7 / cos of a
+    cosine, and as much of the half vector where light and viewer graze a surface from opposite sides.
+    """
 
 
 GRAZING = 0.02
-"""Cosine from which on the promises hold as they stand, a degree above the horizon.
-
-Directions of length 1 in float32 are uncertain by 1e-7.  That is a relative error of 1e-7 / cos of a cosine,
-and as much of the half vector where light and viewer both graze a surface and their sum is short: below this
-cosine what is promised grows as GRAZING / cosine.
-"""
+"""Cosine of a degree above the horizon."""
 
 PROMISES = (
-    Promise(0.05, GRAZING, 1e-4),
-    Promise(0.01, 0.1, 5e-4),
+    Promise(0.05, 0.04, 1e-4),
+    Promise(0.01, 0.1, 5e-4, grows=False),
     Promise(0.01, GRAZING, 2e-3),
     Promise(1e-3, GRAZING, 5e-2),
 )
@@ -71,9 +72,9 @@ NOTHING_LEFT = 0.5
 def promised(m: Array, cosine: Array) -> Array:
     """The largest relative error by m and cosine, which broadcast; infinite where nothing is promised."""
     error = np.full(np.broadcast_shapes(m.shape, cosine.shape), np.inf)
-    growth = np.maximum(1, GRAZING / np.maximum(cosine, LEAST_COSINE))
     for promise in PROMISES:
-        holds = (m >= promise.least_m) & (cosine * growth >= promise.least_cosine)
+        growth = np.maximum(1, promise.least_cosine / np.maximum(cosine, LEAST_COSINE))
+        holds = (m >= promise.least_m) & (promise.grows | (growth == 1))
         error = np.where(holds, np.minimum(error, promise.error * growth), error)
     return np.where((error < NOTHING_LEFT) & (cosine >= LEAST_COSINE), error, np.inf)
 
@@ -145,6 +146,15 @@ def _mirrored(rng: np.random.Generator) -> tuple[Array, Array]:
     return half + across, half - across
 
 
+def _opposite(rng: np.random.Generator) -> tuple[Array, Array]:
+    """Light and viewer that graze some surface from opposite sides, nearly in one plane."""
+    axis = _upwards(rng)
+    (across,) = _at_cosine(axis, np.zeros(1), rng)
+    low, other = 10 ** rng.uniform(-3.3, -1.3, 2)
+    aside = np.cross(axis, across) * 10 ** rng.uniform(-4, -1)
+    return across + low * axis, other * axis - across + aside
+
+
 def _level(v: Array, z: float = 0.0) -> Array:
     return np.array([v[0], v[1] + 1e-3, z])
 
@@ -170,6 +180,8 @@ def directions(rng: np.random.Generator) -> Iterator[tuple[Array, Array]]:
             (light, _level(view)),
             (np.array([0, 0, 1.0]), view),
             (_upwards(rng), _upwards(rng)),
+            _opposite(rng),
+            _opposite(rng),
         ):
             scaled = [v * 10 ** rng.choice([0, 0, rng.uniform(-3, 3)]) for v in pair]
             yield tuple(np.float32(v).astype(np.float64) for v in scaled)

@@ -30,6 +30,7 @@ from hard_examples import (  # noqa: E402  (which lies in tests)
     DTYPES,
     GRAZING,
     LEAST_COSINE,
+    NOTHING_LEFT,
     PRIMARIES,
     PROMISES,
     SLOPES,
@@ -118,7 +119,7 @@ class ErrorMap:
     )
     """For cosines from .1."""
     grazing: dict[Promise, float] = field(default_factory=lambda: dict.fromkeys(PROMISES, 0.0))
-    """The largest error below `GRAZING`, times cosine / GRAZING."""
+    """The largest error below the least cosine, divided by what the promise grows by there."""
     cells: NDArray[np.float64] = field(
         default_factory=lambda: np.zeros((2, len(LOG_M) - 1, len(LOG_COSINES) - 1))
     )
@@ -132,8 +133,8 @@ class ErrorMap:
             for kept, values in zip(both, (ours, printed), strict=True):
                 kept.add(values[of])
         for promise in PROMISES:
-            low = (m >= promise.least_m) & (cosine < GRAZING) & np.isfinite(promised(m, cosine))
-            scaled = np.max(ours * cosine / GRAZING, where=low, initial=0)
+            low = (m >= promise.least_m) & (cosine < promise.least_cosine) & np.isfinite(promised(m, cosine))
+            scaled = np.max(ours * cosine / promise.least_cosine, where=low, initial=0)
             self.grazing[promise] = max(self.grazing[promise], float(scaled))
         cell = tuple(
             np.clip(np.searchsorted(edges, np.log10(values)) - 1, 0, len(edges) - 2)
@@ -215,7 +216,8 @@ def _apart(one: Array, other: Array) -> Array:
 
 INTRODUCTION = """# Hard cases
 
-Light and viewer from straight above to the horizon and on it, alike, opposite and nearly so, of any length.
+Light and viewer from straight above to the horizon and on it, alike, opposite and nearly so, grazing from
+opposite sides, of any length.
 Half of the normals lie within 3 m of the half vector; others are grazed, face away, or have no direction.
 m is from 1e-4, ks from 0.  One sample in five is of any numbers within four times the ranges of the channels.
 Every back end computes the same samples in float32 and in float64 (`tools/hard_cases.py`).
@@ -272,13 +274,11 @@ def report(models: Iterable[Findings], mids: Iterable[Findings], errors: ErrorMa
         yield row(*limits, ours.largest, at, printed.largest, printed_at, f"{printed_at / at:,.0f}")
     yield ""
     yield (
-        "Directions of length 1 are uncertain by 1e-7 in float32.  Below a cosine of "
-        f"{GRAZING:g}, a degree above\nthe horizon, the promise therefore grows as one over the cosine "
-        "until it is .5, where it ends.  The\nlargest error there, times cosine / "
-        f"{GRAZING:g}: "
-        + ", ".join(
-            f"{errors.grazing[p]:.1e} for m from {p.least_m:g}" for p in PROMISES if p.least_cosine == GRAZING
-        )
+        "Directions of length 1 are uncertain by 1e-7 in float32, and the half vector of light and viewer that\n"
+        "graze a surface from opposite sides by more: below these cosines all promises but the second grow\n"
+        f"therefore as one over the cosine, until they are {NOTHING_LEFT:g}, where they end.  "
+        "The largest errors there,\ndivided by that growth: "
+        + ", ".join(f"{errors.grazing[p]:.1e} for m from {p.least_m:g}" for p in PROMISES if p.grows)
         + "."
     )
     yield BY_ROUGHNESS
