@@ -13,6 +13,9 @@ from iccbrdf.errors import UsageError
 LIGHT = ("litX", "litY", "litZ")
 VIEW = ("vueX", "vueY", "vueZ")
 
+_ROUNDING = 1e-6
+"""How far below the horizon a direction on it may come to lie, of a longest component of 1."""
+
 
 def environment(light: str | None, view: str | None, env: Iterable[str]) -> dict[str, float]:
     """Run-time variables that a light, a view and items `NAME=VALUE` set; the items have the last word."""
@@ -50,7 +53,7 @@ def parse_direction(option: str, text: str) -> tuple[float, float, float]:
     else:
         # Scaled first, so that no square overflows or vanishes.
         vector = np.array(numbers) / (max(map(abs, numbers)) or 1)
-        if numbers[2] < 0:
+        if vector[2] < -_ROUNDING:
             raise UsageError(f"{option} {text!r}: z is {numbers[2]:g}, behind the print; expected 0 or more")
     length = np.linalg.norm(vector)
     if length == 0:

@@ -14,8 +14,8 @@ from iccbrdf.images.blocks import Array, Block
 NonFinite: TypeAlias = Literal["keep", "zero", "error"]
 """What becomes of a pixel with samples that are not finite: it goes on, all its samples are 0, or no more."""
 
-_BRIGHTEST = 2.0
-"""Mean Y of a block of a flat print, at most: papers with optical brighteners come to 1."""
+_BRIGHTEST = 10.0
+"""Mean Y of a block of a flat print, at most: white has 1, and where it has 100, most have more."""
 
 
 def all_within(data: Array, limit: float) -> bool:
@@ -71,7 +71,7 @@ def check_scale(block: Block, samples: str, names: Sequence[str], label: str) ->
     Raises
     ------
     InputError
-        The mean of Y is above 2, as it is where white has 100.
+        The mean of Y is above 10, as it is where white has 100.
     """
     if samples != "real" or not {"X", "Y", "Z", *NORMAL} <= set(names):
         return
