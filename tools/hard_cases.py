@@ -275,8 +275,8 @@ def report(models: Iterable[Findings], mids: Iterable[Findings], errors: ErrorMa
     yield ""
     yield (
         "Directions of length 1 are uncertain by 1e-7 in float32, and the half vector of light and viewer\n"
-        "that graze a surface from opposite sides by more: below these cosines all promises but the second grow\n"
-        f"therefore as one over the cosine, until they are {NOTHING_LEFT:g}, where they end.  "
+        "that graze a surface from opposite sides by more.  Below these cosines all promises but the second\n"
+        f"grow as one over the cosine therefore, and end where they are {NOTHING_LEFT:g}.  "
         "The largest errors there,\ndivided by that growth: "
         + ", ".join(f"{errors.grazing[p]:.1e} for m from {p.least_m:g}" for p in PROMISES if p.grows)
         + "."
