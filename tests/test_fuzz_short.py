@@ -21,7 +21,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 INPUTS = {
-    "profile": 8, "program": 80, "xml": 100, "template": 12, "source": 5, "packed": 200, "page": 10,
+    "profile": 8, "program": 80, "xml": 100, "template": 12, "source": 12, "packed": 200, "page": 24,
     "display": 60, "arguments": 60, "primaries": 40, "slopes": 30, "table": 120, "fit": 16, "tiff": 80,
     "print": 60, "picture": 80, "exr": 150, "job": 250, "log": 200,
 }  # fmt: skip

@@ -17,7 +17,17 @@ import tifffile
 import xml_examples
 
 from iccbrdf.calc.program import encode_ops, parse
-from iccbrdf.icc import XYZ, Curve, ExtendedClut, Header, LutAToB, Profile, read_profile
+from iccbrdf.icc import (
+    XYZ,
+    Calculator,
+    Curve,
+    ExtendedClut,
+    Header,
+    LutAToB,
+    MultiProcess,
+    Profile,
+    read_profile,
+)
 from iccbrdf.icc.source_tag import SIGNATURE
 from iccbrdf.icc.xml import profile_to_xml
 from iccbrdf.images.blocks import Block
@@ -156,7 +166,7 @@ def packed() -> list[bytes]:
 
 def templates() -> list[bytes]:
     """Models in the source language."""
-    names = ("cook_torrance", "ward")
+    names = ("cook_torrance", "cook_torrance_2020_literal", "ward_literal", "ward")
     return [(folder("calc_templates") / f"{name}.calc").read_bytes() for name in names]
 
 
@@ -190,8 +200,19 @@ def logs() -> list[bytes]:
 
 
 def page_profiles() -> list[bytes]:
-    """The profiles of a page: an MVIS, and a MID."""
-    return [(_HERE / name).read_bytes() for name in ("mvis.icc", "mid.icc")]
+    """The profiles of a page: an MVIS, a MID, and MVIS of little programs, of which more can be tried."""
+    shipped = [(_HERE / name).read_bytes() for name in ("mvis.icc", "mid.icc")]
+    mvis = Profile.from_bytes(shipped[0]).replace(remove=[SIGNATURE])
+    channels = mvis["M2B0"].inputs
+    little = (Calculator(channels, 3, parse("{ " + text + " }")) for text in _SHADERS)
+    return [*shipped, *(mvis.replace(tags={"M2B0": MultiProcess.of(one)}).to_bytes() for one in little)]
+
+
+_SHADERS = (
+    "in(0,3) in(9) env(litZ) pop mul copy(1,2) mul(3) out(0,3)",
+    "in(0,3) in(7) env(litX) pop gt if { sin cbrt } else { 0 max } in(3,3) add(3) out(0,3)",
+    "env(litX) pop env(litY) pop atn2 copy(1,2) in(3,3) exp(3) mul(3) sqrt(3) out(0,3)",
+)
 
 
 def cmyk_profile() -> bytes:
