@@ -356,7 +356,7 @@ def test_moving_the_light_changes_the_picture(demo):
     demo.page.tab.mouse.down()
     demo.page.tab.mouse.move(middle[0] + pad["width"] * 0.3, middle[1])
     demo.page.tab.mouse.up()
-    assert demo.page.tab.locator("#light-value").inner_text() == "49\u00b0 right"
+    assert demo.page.tab.locator("#light-value").inner_text() == "41\u00b0 right"
     assert abs(demo.picture() - before)[:, :550].mean() > 10
 
 
@@ -373,7 +373,7 @@ def test_what_is_drawn_is_what_is_measured(demo):
 
 
 @pytest.mark.parametrize(
-    ("keys", "expected"), [("ArrowRight", "48\u00b0 left"), ("2", "16\u00b0 right"), ("5", "50\u00b0 top")]
+    ("keys", "expected"), [("ArrowRight", "42\u00b0 left"), ("2", "74\u00b0 right"), ("5", "40\u00b0 top")]
 )
 def test_keys_move_the_light(demo, keys, expected):
     demo.page.tab.keyboard.press(keys)

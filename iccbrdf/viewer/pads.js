@@ -30,12 +30,12 @@ function unit(vector) {
 
 const SIDES = ["right", "top right", "top", "top left", "left", "bottom left", "bottom", "bottom right"];
 
-// Height above the print and side, as "45° left".
+// Zenith angle, as on the command line, and side: "60° left".
 function inWords(vector) {
-  const height = Math.round((Math.asin(Math.min(1, Math.max(-1, vector[2]))) * 180) / Math.PI);
-  if (height > 87) return "above";
+  const zenith = Math.round((Math.acos(Math.min(1, Math.max(-1, vector[2]))) * 180) / Math.PI);
+  if (zenith < 3) return "above";
   const side = Math.round((Math.atan2(vector[1], vector[0]) * 4) / Math.PI + 8) % 8;
-  return `${height}\u00b0 ${SIDES[side]}`;
+  return `${zenith}\u00b0 ${SIDES[side]}`;
 }
 
 // A hemisphere seen from above, with a knob for each direction.  `moved(which, vector)` is told of drags.
