@@ -43,7 +43,7 @@ SCENES = ("flat matte", "flat glossy", "relief matte", "relief glossy", "relief 
 WHITE = (0.9642, 1.0, 0.8249)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def scene(request):
     if request.param == "painting":
         return painting(request.getfixturevalue("shared_data") / "painting")
@@ -65,6 +65,12 @@ class Proofs:
         transform = self._linked[without]
         known = {name: value for name, value in env.items() if name in transform.variables}
         return transform.with_env(known)(self.image.data).astype(np.float64)
+
+
+@pytest.fixture(scope="module")
+def proofs(scene):
+    """Of one scene, for all that is asked of it."""
+    return Proofs(*scene)
 
 
 def dE(one, other, white=WHITE):
@@ -100,8 +106,7 @@ SPARED = {
 
 
 @EACH_SCENE
-def test_without_tolerance_the_reduced_proof_is_the_full_one(name, scene):
-    proofs = Proofs(*scene)
+def test_without_tolerance_the_reduced_proof_is_the_full_one(name, proofs):
     spared = set()
     for light, view in lights_and_views(name, 1):
         decision = proofs.planning.plan(single(light), single(view)).decision
@@ -113,9 +118,8 @@ def test_without_tolerance_the_reduced_proof_is_the_full_one(name, scene):
 
 
 @EACH_SCENE
-def test_within_a_tolerance_the_loss_is_within_the_promised_bound(name, scene):
+def test_within_a_tolerance_the_loss_is_within_the_promised_bound(name, scene, proofs):
     recipe, _ = scene
-    proofs = Proofs(*scene)
     for light, view in lights_and_views(name, 3):
         decision = proofs.planning.plan(single(light), single(view), tolerance=0.5).decision
         assert decision.bound <= 0.5
