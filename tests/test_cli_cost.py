@@ -93,6 +93,7 @@ def test_mistakes(run, image, tmp_path):
     assert run("cost", tmp_path / "not read", "--primaries", PRIMARIES, "-o", tmp_path).code == 2
     assert (tmp_path / "cost.md").read_text() == "mine"
     assert run("cost", tmp_path / "none.tif", "--primaries", PRIMARIES, "-o", tmp_path / "new").code == 3
+    assert not (tmp_path / "new").exists()
 
 
 def test_build_within_a_budget_takes_the_way_that_is_recommended(run, image, tmp_path, few, monkeypatch):

@@ -126,13 +126,14 @@ def command(
         interpolation,
         slope_method,
     )
-    make_folder(folder)
     targets = {name: folder / name for name in ("cost.json", "cost.md", "cost.png", "cost_errors.png")}
-    for target in targets.values():
-        check_target(target, overwrite=force)
+    if folder.exists():
+        for target in targets.values():
+            check_target(target, overwrite=force)
     declared = name_list(channels) if channels is not None else None
     with open_image(image, samples) as source:
         planning = Planning(source, recipe, declared)
+        make_folder(folder)
         report = measure_image(
             planning, environment(light, view, env), pixels=pixels, runs=runs, told=_progress()
         )

@@ -46,14 +46,15 @@ def frozen(values: Any, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
 class Constant(FieldType):
     """Fixed bytes that mark a structure; anything else there is an error."""
 
-    def __init__(self, expected: bytes) -> None:
+    def __init__(self, expected: bytes, why: str = "") -> None:
         self.expected = expected
+        self.why = why
 
     def read(self, reader: Reader, name: str, seen: Seen) -> bytes:
         at = reader.position
         found = bytes(reader.take(len(self.expected), f"signature {self.expected!r}"))
         if found != self.expected:
-            raise reader.error(f"found {found!r}, expected {self.expected!r}", at=at)
+            raise reader.error(f"found {found!r}, expected {self.expected!r}{self.why}", at=at)
         return found
 
     def write(self, out: bytearray, value: Any, record: Any) -> None:

@@ -103,7 +103,7 @@ class Header(Record):
         Field("colour_space", Colour()),
         Field("pcs", Colour()),
         Field("created", Repeat(U16, 6)),
-        Constant(b"acsp"),
+        Constant(b"acsp", ", which every ICC profile has there"),
         Field("platform", SIGNATURE),
         Field("flags", U32),
         Field("manufacturer", SIGNATURE),
