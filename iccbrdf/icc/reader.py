@@ -151,6 +151,8 @@ class Reader:
         overlap one another nor what of this window has been read already, so that the work stays in
         proportion to the bytes.
         """
+        # First, as a profile that is over its limits has many such tables.
+        self.count_parts(len(spans))
         self._check_disjoint(spans, label)
         known: dict[tuple[int, int], tuple[Any, tuple[int, ...]]] = {}
         values = []
@@ -162,7 +164,6 @@ class Reader:
                     count(more)
             else:
                 before = self._budget.used
-                self.count_parts(1)
                 value = read(self.part(*span, label(index)), index)
                 weight = tuple(a - b for a, b in zip(self._budget.used, before, strict=True))
                 known[span] = value, weight

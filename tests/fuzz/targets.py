@@ -152,7 +152,7 @@ def profile(data: bytes) -> bool:
         pass
     else:
         xml_file(xml)
-    taken = run_chain([read], *_turn(data, [("auto",), ("numpy", "interpreter")]))
+    taken = run_chain([read], "numpy", "interpreter")
     return run_chain(_turn(data, [[mid, read], [read, mvis]]), "numpy") | taken
 
 
