@@ -95,9 +95,8 @@ class Document:
 def parse(data: bytes, source: str, document: Document) -> Node:
     """The root element of a document.
 
-    Raises InputError where it is no well-formed XML, ProfileError where it declares a document type,
-    UnsupportedError where it is in a rare encoding, and LimitError where it is larger or deeper than libxml2
-    reads without being told to.
+    Raises InputError where it is no well-formed XML or in a rare encoding, ProfileError where it declares a
+    document type, and LimitError where it is larger or deeper than libxml2 reads without being told to.
     """
     if len(data) > MAX_BYTES:
         raise LimitError(f"{source}: larger than the limit of {MAX_BYTES} bytes")
@@ -106,7 +105,7 @@ def parse(data: bytes, source: str, document: Document) -> Node:
     encoding = _ENCODING.match(data)
     if encoding is not None and not _PLAIN.fullmatch(encoding[1]):
         found = encoding[1].decode("ascii", "replace")
-        raise UnsupportedError(f"{source}:1: found the encoding {found!r}, expected 'UTF-8' or 'UTF-16'")
+        raise InputError(f"{source}:1: found the encoding {found!r}; expected an XML file in UTF-8 or UTF-16")
     parser = etree.XMLParser(
         resolve_entities=False,
         no_network=True,
