@@ -16,7 +16,7 @@ from typing import TypeAlias
 import numpy as np
 
 from iccbrdf.calc.exact_passes import EXACT_PASSES
-from iccbrdf.calc.graph import LOGIC, TRUTHS, Graph, Node, check, is_truth
+from iccbrdf.calc.graph import LOGIC, TRUTHS, Graph, Node, is_truth
 from iccbrdf.calc.intervals import ANYTHING, EITHER, FALSE, TRUE, Arithmetic, Interval, square
 from iccbrdf.calc.passes import Report, optimise, uniform
 from iccbrdf.calc.program import signature
@@ -205,7 +205,6 @@ def fold(graph: Graph, decisions: Decisions) -> tuple[Graph, tuple[Report, ...]]
             continue
         changes[_description(node)] += 1
     result.outputs = tuple(replaced[output] for output in graph.outputs)
-    check(result)
     report = Report("fold what is decided", len(replaced), len(result.live()), tuple(changes.most_common()))
     result, reports = optimise(result, EXACT_PASSES)
     return result, (report, *reports)

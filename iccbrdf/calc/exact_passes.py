@@ -36,8 +36,13 @@ def neutral(graph: Graph, node: Node) -> Node | None:
     return None
 
 
+_SIGNED = frozenset(("add", "sub", "mul", "div", "neg", "abs"))
+
+
 def sign(graph: Graph, node: Node) -> Node | None:
     """x + -y = x - y, x - -y = x + y, -x + y = y - x, --x = x, (-x)(-y) = x y (/ too), |-x| = |x|."""
+    if node.op not in _SIGNED:
+        return None
     negated = [argument.op == "neg" for argument in node.arguments]
     if node.op in ("add", "sub") and negated[1]:
         other = {"add": "sub", "sub": "add"}[node.op]

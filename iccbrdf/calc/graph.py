@@ -40,7 +40,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -54,19 +54,24 @@ TRUTHS = COMPARISONS | LOGIC | {"rnum", "defined"}
 """Operators whose value is a condition: 1 or 0 where a number is wanted."""
 
 
+_LARGE = 1e38
+"""Numbers below it are numbers in every type, and need no watch for overflow."""
+
+
 class GraphError(IccBrdfError):
     """A graph breaks its own rules: a fault of the compiler, never of its input."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class Node:
     """One value; compared by identity, which in one graph is equality."""
 
-    index: int
-    op: str
-    arguments: tuple[Node, ...]
-    detail: Any
-    width: int
+    # Final, and not a frozen dataclass: those take three times as long to make.
+    index: Final[int]
+    op: Final[str]
+    arguments: Final[tuple[Node, ...]]
+    detail: Final[Any]
+    width: Final[int]
 
     def __repr__(self) -> str:
         shown = [f"%{argument.index}" for argument in self.arguments]
@@ -96,11 +101,11 @@ class Graph:
     def add(self, op: str, arguments: Sequence[Node] = (), detail: Any = None, width: int = 0) -> Node:
         """The node of this operator and these arguments; `width` matters where they leave it open."""
         arguments = tuple(arguments)
-        width = _width(op, arguments, detail, width)
-        key = (op, tuple(argument.index for argument in arguments), _exact(op, detail), width)
+        # What is known already has a width: all that it hangs on is in the key.
+        key = (op, arguments, _exact(op, detail), width if op in _OPEN else 0)
         node = self._known.get(key)
         if node is None:
-            node = Node(len(self.nodes), op, arguments, detail, width)
+            node = Node(len(self.nodes), op, arguments, detail, _width(op, arguments, detail, width))
             self.nodes.append(node)
             self._known[key] = node
         elif arguments:
@@ -112,6 +117,8 @@ class Graph:
 
     def number(self, value: float) -> Node:
         """A constant, rounded to the graph's type."""
+        if abs(value) < _LARGE:
+            return self.const(float(self.dtype(value)))
         with np.errstate(over="ignore"):
             return self.const(float(self.dtype(value)))
 
@@ -136,6 +143,11 @@ class Graph:
 
     def rotl(self, vector: Node, k: int) -> Node:
         return self.add("rotl", [vector], k)
+
+    def require(self, node: Node) -> None:
+        """GraphError for a node of another graph."""
+        if node.index >= len(self.nodes) or self.nodes[node.index] is not node:
+            raise GraphError(f"{node} is of another graph")
 
     def live(self) -> list[Node]:
         """The nodes that the outputs need, in order."""
@@ -224,6 +236,8 @@ _COUNTS = {
     "pick": 1, "splat": 1, "rotl": 1, "curve": 1, "tint": 1, "select": 3,
 }  # fmt: skip
 """How many arguments the kinds of nodes take that are no calculator operators."""
+_OPEN = frozenset(("input", "pick", "splat"))
+"""Kinds of nodes whose width is asked for."""
 
 
 def _width(op: str, arguments: Sequence[Node], detail: Any, asked: int) -> int:
@@ -298,8 +312,7 @@ def check(graph: Graph) -> None:
             raise GraphError(f"{node} is there twice")
         seen.add(key)
     for output in graph.outputs:
-        if output.index >= len(graph.nodes) or graph.nodes[output.index] is not output:
-            raise GraphError(f"output {output} is of another graph")
+        graph.require(output)
 
 
 # Constants ---------------------------------------------------------------------------------------------

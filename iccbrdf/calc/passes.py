@@ -55,10 +55,14 @@ def uniform(node: Node) -> float | None:
 
 def constant(graph: Graph, node: Node) -> Node | None:
     """An operator on constants is a constant, in the graph's type; one that repeats a number is a splat."""
-    arguments = [known(argument) for argument in node.arguments]
-    if node.op == "splat" or not arguments or None in arguments:
+    if node.op == "splat" or not node.arguments:
         return None
-    numbers = [values for values in arguments if values]
+    numbers: list[tuple[float, ...]] = []
+    for argument in node.arguments:
+        number = known(argument)
+        if number is None:
+            return None
+        numbers.append(number)
     values = evaluate(node.op, numbers, node.detail, node.width, graph.dtype)
     if values is None:
         return None
@@ -211,6 +215,7 @@ def rewrite(graph: Graph, rules: Sequence[Rule]) -> tuple[Graph, Counter[str]]:
         for rule in rules:
             better = rule(result, candidate)
             if better is not None:
+                result.require(better)
                 changes[rule.__name__.replace("_", " ")] += 1
                 candidate = better
                 break
@@ -218,7 +223,6 @@ def rewrite(graph: Graph, rules: Sequence[Rule]) -> tuple[Graph, Counter[str]]:
         if node in graph.names:
             result.names.setdefault(candidate, graph.names[node])
     result.outputs = tuple(replaced[output] for output in graph.outputs)
-    check(result)
     return result, changes
 
 
@@ -244,12 +248,12 @@ def optimise(graph: Graph, passes: Passes = PASSES) -> tuple[Graph, tuple[Report
         idle += 1
         if changes:
             idle = 0
-            reports.append(
-                Report(name, len(graph.live()), len(rewritten.live()), tuple(changes.most_common()))
-            )
+            before, live = live, len(rewritten.live())
+            reports.append(Report(name, before, live, tuple(changes.most_common())))
         graph = rewritten
     # Rules leave behind what they replaced; a rewriting without rules keeps what is live.
     graph, _ = rewrite(graph, ())
+    check(graph)
     return graph, tuple(reports)
 
 
