@@ -11,6 +11,8 @@ from conftest import ROOT, SHARED
 from make_repomap import repomap
 from PIL import Image
 
+from iccbrdf import demo
+
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PRINTER = SHARED / "data" / "icc" / "ISOcoated_v2_300_bas.icc"
 """A printer's profile from elsewhere, in the place of the README's FOGRA39.icc."""
@@ -30,7 +32,11 @@ def commands():
 
 @pytest.fixture
 def place(tmp_path, monkeypatch):
-    """A folder with what the README's commands find: the demo, the profiles, a job and its relief."""
+    """A folder with what the README's commands find: the demo, the profiles, a job and its relief.
+
+    The demo's print is made of larger pixels, as it is the commands that are tried.
+    """
+    monkeypatch.setattr(demo, "PIXEL_PITCH", 0.8)
     (tmp_path / "profiles").symlink_to(ROOT / "profiles")
     rng = np.random.default_rng(0)
     tifffile.imwrite(

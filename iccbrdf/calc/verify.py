@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeAlias
 
 from iccbrdf.calc.appearance import check_conditions
 from iccbrdf.calc.operators import OPERATORS, Element, Operand, stack_effect
@@ -171,8 +171,7 @@ def _verify(
     )
 
 
-@dataclass(frozen=True)
-class _Path:
+class _Path(NamedTuple):
     """The paths to a point of the program: least and greatest depth of the stack, most operations, work."""
 
     least: int = 0
@@ -251,7 +250,7 @@ class _Walk:
             return path
         blocks = [*step.branches, step.otherwise or ()]
         carried = path.greatest + self.temporaries + self.ranges["out"][0]
-        path = replace(path, work=path.work + branch_work(len(blocks), carried))
+        path = path._replace(work=path.work + branch_work(len(blocks), carried))
         ends = [self.block(block, path, level + 1) for block in blocks]
         return _Path(
             min(end.least for end in ends),

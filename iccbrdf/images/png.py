@@ -19,6 +19,8 @@ LONGEST_SIDE = 2**31 - 1
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _RGB = 2
 _SUB = 1
+_LEVEL = 3
+"""Of zlib.  Softproofs are as small as with its default of 6, by a hundredth, and written in half the time."""
 
 
 class PngWriter:
@@ -39,7 +41,7 @@ class PngWriter:
     def __init__(self, file: BinaryIO, height: int, width: int, dtype: np.dtype[Any], profile: bytes) -> None:
         self._file = file
         self._pixel_bytes = 3 * dtype.itemsize
-        self._compressor = zlib.compressobj()
+        self._compressor = zlib.compressobj(_LEVEL)
         file.write(_SIGNATURE)
         self._chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8 * dtype.itemsize, _RGB, 0, 0, 0))
         self._chunk(b"iCCP", b"ICC profile\0" + b"\0" + zlib.compress(profile))

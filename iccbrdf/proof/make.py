@@ -115,12 +115,10 @@ def _make(job: Job, overwrite: bool, workers: int, advance: Callable[[int, int],
             check_target(job.output / file, overwrite=overwrite)
         height, width = source.height, source.width
         to_brdf = link([colour.mid], samples="real", channels=source.names)
+        seen = link([pair.mvis], channels=to_brdf.channels_out)
         chain = Chain(
             to_brdf=to_brdf,
-            scenes=[
-                link([pair.mvis], channels=to_brdf.channels_out, env=scene.env)
-                for scene in (*stills, *frames)
-            ],
+            scenes=[seen.with_env(scene.env) for scene in (*stills, *frames)],
             to_display=standard_XYZ(pair.mvis),
             last_slope=last_slope(colour.mid),
         )
