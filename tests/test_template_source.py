@@ -187,6 +187,8 @@ def test_constants_choices_and_effects_are_set_from_outside():
         ("input b[3] = b.X b.Y b.Z default (1, 2)", "has 2 components, expected 1 or 3"),
         ("runtime light = 1", "'light' cannot be a run-time variable; expected at most 4 characters"),
         ("runtime true = 1", "'true' cannot be a run-time variable"),
+        ("runtime litX = 1e39", "litX is 1e+39; expected 1 finite number (float32)"),
+        ("input a default 1e39", "the default of a is (1e+39,); expected finite numbers (float32)"),
         ("runtime a = 1\nruntime b = (a: 1, c: 2)", "run-time variable 'a' is declared already"),
         ("runtime a = (1, 2)", "the default of a has 2 components, expected 1"),
         ("when shin { let a = 1 }", "t.calc:2:1: no effect 'shin' is declared"),

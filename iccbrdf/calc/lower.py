@@ -220,6 +220,10 @@ class _Lowering:
         if len(default) not in (1, declared.width):
             found = f"the default of {declared.name} has {len(default)} components"
             raise declared.place.error(f"{found}, expected 1 or {declared.width}")
+        if _numbers(default, 1) is None:
+            raise declared.place.error(
+                f"the default of {declared.name} is {default}; expected finite numbers (float32)"
+            )
         for channel in declared.channels:
             if channel in self._read:
                 raise declared.place.error(f"channel {channel!r} is read by an input already")
@@ -248,7 +252,7 @@ class _Lowering:
             raise declared.place.error(f"the default of {name} has {len(default)} components, expected 1")
         given = _numbers(self._variables.get(name, default[0]), 1)
         if given is None or len(given) != 1:
-            found = self._variables[name]
+            found = self._variables.get(name, default[0])
             raise declared.place.error(f"{name} is {found!r}; expected 1 finite number (float32)")
         self._result.variables[name] = float(given[0])
         return self._called(name, self._graph.env(name, float(given[0])))
