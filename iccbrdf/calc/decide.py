@@ -201,7 +201,7 @@ def fold(graph: Graph, decisions: Decisions) -> tuple[Graph, tuple[Report, ...]]
             replaced[node] = result.const(choice)
         else:
             arguments = [replaced[argument] for argument in node.arguments]
-            replaced[node] = result.add(node.op, arguments, node.detail, node.width)
+            replaced[node] = result.again(node, arguments)
             continue
         changes[_description(node)] += 1
     result.outputs = tuple(replaced[output] for output in graph.outputs)

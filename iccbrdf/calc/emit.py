@@ -95,15 +95,16 @@ def operator(name: str, *operands: int) -> Op:
     """An operator of the table with the operands of its text form, `operator("sum", 3)` for `sum(3)`."""
     kind = OPERATORS[name].operand
     first, second = (*operands, 0, 0)[:2]
-    stored = {
-        Operand.COUNT: (first - 1, 0),
-        Operand.COUNT_FROM_TWO: (first - 2, 0),
-        Operand.PAIR: (first - 1, second - 1),
-        Operand.RANGE: (first, second - 1),
-    }.get(kind)
-    if stored is None:
+    if kind is Operand.COUNT:
+        s, t = first - 1, 0
+    elif kind is Operand.COUNT_FROM_TWO:
+        s, t = first - 2, 0
+    elif kind is Operand.PAIR:
+        s, t = first - 1, second - 1
+    elif kind is Operand.RANGE:
+        s, t = first, second - 1
+    else:
         return Op(name, first)
-    s, t = stored
     if not (0 <= s <= 0xFFFF and 0 <= t <= 0xFFFF):
         raise LimitError(f"{name}{operands}: a program has no room for vectors or temporaries of this size")
     return Op(name, s << 16 | t)

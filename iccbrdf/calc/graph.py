@@ -100,12 +100,21 @@ class Graph:
 
     def add(self, op: str, arguments: Sequence[Node] = (), detail: Any = None, width: int = 0) -> Node:
         """The node of this operator and these arguments; `width` matters where they leave it open."""
-        arguments = tuple(arguments)
+        return self._node(op, tuple(arguments), detail, width, None)
+
+    def again(self, node: Node, arguments: Sequence[Node]) -> Node:
+        """A node of another graph on arguments that stand for its own: `check` tells if widths differ."""
+        return self._node(node.op, tuple(arguments), node.detail, node.width, node.width)
+
+    def _node(self, op: str, arguments: tuple[Node, ...], detail: Any, asked: int, width: int | None) -> Node:
         # What is known already has a width: all that it hangs on is in the key.
-        key = (op, arguments, _exact(op, detail), width if op in _OPEN else 0)
+        exact = None if detail is None else _exact(op, detail)
+        key = (op, arguments, exact, asked if op in _OPEN else 0)
         node = self._known.get(key)
         if node is None:
-            node = Node(len(self.nodes), op, arguments, detail, _width(op, arguments, detail, width))
+            if width is None:
+                width = _width(op, arguments, detail, asked)
+            node = Node(len(self.nodes), op, arguments, detail, width)
             self.nodes.append(node)
             self._known[key] = node
         elif arguments:

@@ -211,7 +211,7 @@ def rewrite(graph: Graph, rules: Sequence[Rule]) -> tuple[Graph, Counter[str]]:
     replaced: dict[Node, Node] = {}
     for node in live:
         arguments = [replaced[argument] for argument in node.arguments]
-        candidate = result.add(node.op, arguments, node.detail, node.width)
+        candidate = result.again(node, arguments)
         for rule in rules:
             better = rule(result, candidate)
             if better is not None:

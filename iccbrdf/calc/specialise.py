@@ -215,7 +215,7 @@ def hold(graph: Graph, yes: Collection[Question]) -> tuple[Graph, tuple[Report, 
             changes["constant channel"] += 1
         else:
             arguments = [replaced[argument] for argument in node.arguments]
-            replaced[node] = result.add(node.op, arguments, node.detail, node.width)
+            replaced[node] = result.again(node, arguments)
     result.outputs = tuple(replaced[output] for output in graph.outputs)
     report = Report("hold channels", len(replaced), len(result.nodes), tuple(changes.most_common()))
     result, reports = optimise(result, EXACT_PASSES)
