@@ -68,9 +68,17 @@ class Proofs:
 
 
 @pytest.fixture(scope="module")
-def proofs(scene):
-    """Of one scene, for all that is asked of it."""
-    return Proofs(*scene)
+def made():
+    """Proofs by the name of their scene, kept for all that is asked of it."""
+    return {}
+
+
+@pytest.fixture
+def proofs(name, scene, made):
+    """Of one scene."""
+    if name not in made:
+        made[name] = Proofs(*scene)
+    return made[name]
 
 
 def dE(one, other, white=WHITE):
