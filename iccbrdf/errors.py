@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from itertools import islice
 
 
 class IccBrdfError(Exception):
@@ -71,14 +72,24 @@ class ProfileWarning(IccBrdfWarning):
     """A profile deviates from the specification in a way that does not hinder its use."""
 
 
+_MOST_NAMES, _MOST_SHOWN, _LONGEST_NAME = 2000, 100, 200
+"""Of what a message about a name looks at, and shows: files may have millions of names, and long ones."""
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """The end of a message about an unknown name: the nearest valid one, or all of them when none is near."""
-    valid = list(valid)
+    """The end of a message about an unknown name: the nearest valid one, or all of them when none is near.
+
+    Of very many names the first ones only, and none that are very long.
+    """
+    first = list(islice(valid, _MOST_NAMES))
+    names = [v for v in first if len(v) <= _LONGEST_NAME]
     # A misspelling by case alone scores badly with difflib, yet is the likeliest one.
-    folded = {v.casefold(): v for v in valid}
-    close = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
+    folded = {v.casefold(): v for v in names}
+    close = difflib.get_close_matches(name[:_LONGEST_NAME].casefold(), folded, n=1, cutoff=0.5)
     if close:
         return f"did you mean {folded[close[0]]!r}?"
-    if not valid:
+    if not first:
         return "there are none"
-    return "valid are " + ", ".join(valid)
+    more = len(first) > min(len(names), _MOST_SHOWN)
+    shown = (n if n.isprintable() else repr(n) for n in names[:_MOST_SHOWN])
+    return "valid are " + ", ".join([*shown, *["..."] * more])

@@ -352,7 +352,9 @@ class _Parser:
                 raise self._error(f"{word!r} has no argument, expected {word}(index)")
             if not (re.fullmatch(r"[0-9]{1,5}", str(written)) and least <= int(written) <= least + 0xFFFF):
                 span = f"{least} to {least + 0xFFFF}"
-                raise self._error(f"{word!r} has the argument {written!r}, expected an integer from {span}")
+                raise self._error(
+                    f"{word!r} has the argument {written!r:.40}, expected an integer from {span}"
+                )
             stored[place] = int(written) - least
         return stored[0] << 16 | stored[1]
 

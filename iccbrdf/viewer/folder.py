@@ -50,6 +50,9 @@ def read_folder(folder: Path) -> ProofFolder:
     LimitError where the log is larger than MAX_BYTES.
     """
     try:
+        # A folder from a stranger may hold a pipe, which never ends.
+        if (folder / LOG).exists() and not (folder / LOG).is_file():
+            raise InputError(f"{folder / LOG}: is not a regular file")
         log = json.loads(read_whole(folder / LOG, MAX_BYTES))
         job, scene = log["job"], log["scenes"][0]
         env = {str(name): _finite(value) for name, value in scene["env"].items()}

@@ -136,6 +136,8 @@ def _product(shape: Iterable[int]) -> str:
 
 def write_numbers(out: Target, values: npt.NDArray[Any]) -> None:
     """Numbers as text: those of the last axis in a line where there are several axes, else eight."""
+    # At least a digit and a blank each: known before millions of them are made text.
+    out.check_text(2 * values.size - 1)
     texts = decimals(values.reshape(-1))
     width = values.shape[-1] if values.ndim > 1 else 8
     lines = [" ".join(texts[i : i + width]) for i in range(0, len(texts), max(1, width))]

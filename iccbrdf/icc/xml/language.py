@@ -21,6 +21,8 @@ from iccbrdf.icc.source_tag import CalculatorSource
 from iccbrdf.icc.xml.node import Node
 from iccbrdf.icc.xml.values import Codec
 
+MAX_MAIN_WORDS = 1 << 20
+"""Words of the main functions of a document, several for each of the operations that a tag may have."""
 MAX_WORDS = 1 << 16
 """Words that the macros of a document stand for in all: small files could stand for endless ones."""
 MAX_CALLS = 64
@@ -184,7 +186,12 @@ class _Expansion:
             if token["comment"]:
                 continue
             document = place.node.document
-            document.words += place.macro is not None
+            if place.macro is None:
+                document.main_words += 1
+            else:
+                document.words += 1
+            if document.main_words > MAX_MAIN_WORDS:
+                raise place.error(f"main functions have more than {MAX_MAIN_WORDS} words", LimitError)
             if document.words > MAX_WORDS:
                 raise place.error(f"macros stand for more than {MAX_WORDS} words", LimitError)
             word = token["word"]

@@ -26,6 +26,10 @@ MAX_BYTES = 128 << 20
 """Of an XML file together with all files that it names, and of the XML that is written."""
 MAX_MARKS = 1 << 21
 """Signs `<` and `=` in a file, of which each element and attribute has one: they take 250 bytes each."""
+MAX_ATTRIBUTES = 256
+"""Of an element."""
+MAX_PROFILES = 1 << 10
+"""Profiles inside others: each takes about as long as a document."""
 MAX_WARNINGS = 20
 MAX_TEXT = 10_000_000
 """Bytes in one piece of text: what libxml2 reads unless it is told to give up its limits."""
@@ -48,8 +52,12 @@ class Document:
     def __init__(self, folder: Path | None, *, strict: bool = False) -> None:
         self.folder = folder
         self.strict = strict
+        self.main_words = 0
+        """Words of main functions so far."""
         self.words = 0
         """Words that macros have stood for so far."""
+        self.profiles = 0
+        """Profiles inside profiles so far."""
         self._left = MAX_BYTES
         self._warnings = 0
 
@@ -82,10 +90,15 @@ class Document:
         folder = self.folder.resolve()
         try:
             path = (folder / filename).resolve()
+            special = path.exists() and not path.is_file()
         except (OSError, ValueError, RuntimeError) as error:
-            raise node.error(f"found the file name {filename!r}, expected one that can be: {error}") from None
+            reason = getattr(error, "strerror", None) or error
+            raise node.error(f"found the file name {filename!r:.200}: {reason}") from None
         if not path.is_relative_to(folder):
-            raise node.error(f"found the file name {filename!r}, expected one inside {folder}")
+            raise node.error(f"found the file name {filename!r:.200}, expected one inside {folder}")
+        # A pipe never ends.
+        if special:
+            raise node.error(f"{path}: is not a regular file", kind=InputError)
         try:
             return path, self.read(path)
         except InputError as error:
@@ -151,6 +164,9 @@ class Node:
 
     @property
     def attributes(self) -> Mapping[str, str]:
+        # libxml2 looks for each of them among all.
+        if len(self._element.attrib) > MAX_ATTRIBUTES:
+            raise self.error(f"more than {MAX_ATTRIBUTES} attributes", kind=LimitError)
         return dict(self._element.attrib)
 
     @property
@@ -224,12 +240,13 @@ class Node:
 class Job:
     """What the elements of one document that is made have in common.
 
-    names: sources of calculators, by the `id` of their record.
+    names: sources of calculators, by the `id` of their record.  profiles: those inside others, so far.
     """
 
     def __init__(self, source: str, names: Mapping[int, CalculatorSource] | None = None) -> None:
         self.source = source
         self.names = names or {}
+        self.profiles = 0
         self._left = MAX_BYTES
 
     def spend(self, target: Target, characters: int) -> None:
@@ -271,10 +288,14 @@ class Target:
         self.job.spend(self, len(plain) + 9)
         self.element.append(etree.Comment(f" {plain} "))
 
+    def check_text(self, characters: int) -> None:
+        """LimitError where its text would have more characters than XML readers take."""
+        if characters > MAX_TEXT:
+            raise self.error(f"{characters} characters, but XML readers take {MAX_TEXT} at most", LimitError)
+
     def write(self, text: str) -> None:
         """Give it its text."""
-        if len(text) > MAX_TEXT:
-            raise self.error(f"{len(text)} characters, but XML readers take {MAX_TEXT} at most", LimitError)
+        self.check_text(len(text))
         self.job.spend(self, len(text))
         try:
             self.element.text = text

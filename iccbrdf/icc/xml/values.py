@@ -71,15 +71,20 @@ def numbers(dtype: npt.DTypeLike) -> Codec:
     kind = np.dtype(dtype)
 
     def read(text: str) -> Numbers:
-        tokens = text.replace(",", " ").split()
-        found = [_NUMBER.match(token) for token in tokens]
-        odd = next((t for t, n in zip(tokens, found, strict=True) if n is None or n[0] != t), None)
-        texts = [n[0] for n in found if n is not None]
-        if len(texts) < len(tokens):
-            raise ValueError(f"found {odd!r:.40}, expected a number")
-        values = np.array([_integer(t, kind) for t in texts], kind) if kind.kind == "u" else np.array(
-            [float(t) for t in texts], np.float64
-        )  # fmt: skip
+        texts = text.replace(",", " ").split()
+        odd = None
+        for index, token in enumerate(texts):
+            number = _NUMBER.match(token)
+            if number is None or number[0] != token:
+                odd = token if odd is None else odd
+                if number is None:
+                    raise ValueError(f"found {odd!r:.40}, expected a number")
+                texts[index] = number[0]
+        values: Numbers
+        if kind.kind == "u":
+            values = np.fromiter((_integer(t, kind) for t in texts), kind, len(texts))
+        else:
+            values = np.fromiter(map(float, texts), np.float64, len(texts))
         if odd is not None:
             raise Odd(f"found {odd!r:.40}, read as far as it is a number", values)
         return values

@@ -11,7 +11,7 @@ from iccbrdf.icc.sequence import EmbeddedProfile
 from iccbrdf.icc.xml.composite import TYPE_FORMS, NamedTags
 from iccbrdf.icc.xml.forms import Form, Part, Seen
 from iccbrdf.icc.xml.header import HEADER
-from iccbrdf.icc.xml.node import Node, Target
+from iccbrdf.icc.xml.node import MAX_PROFILES, Node, Target
 from iccbrdf.icc.xml.tag_names import TAG_NAMES
 
 ROOT = "IccProfile"
@@ -47,11 +47,17 @@ class _Embedded(Part):
     children = (ROOT,)
 
     def read(self, node: Node, seen: Seen) -> None:
+        node.document.profiles += 1
+        if node.document.profiles > MAX_PROFILES:
+            raise node.error(f"more than {MAX_PROFILES} profiles inside profiles", kind=LimitError)
         seen["data"] = read_whole(node.required(ROOT)).to_bytes()
 
     def write(self, out: Target, record: EmbeddedProfile) -> None:
         if sum(1 for _ in out.element.iterancestors(ROOT)) == MAX_DEPTH:
             raise out.error(f"profiles are nested deeper than the limit of {MAX_DEPTH}", LimitError)
+        out.job.profiles += 1
+        if out.job.profiles > MAX_PROFILES:
+            raise out.error(f"more than {MAX_PROFILES} profiles inside profiles", LimitError)
         write_whole(out.child(ROOT), record.profile)
 
 
