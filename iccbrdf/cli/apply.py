@@ -69,17 +69,18 @@ def _relief(
     height_map: Path | None,
     relief: float | None,
     pitch: float | None,
+    size: tuple[int, int],
 ) -> Array | None:
-    """Unit normals, (height, width, 3), from one of the two kinds of maps; None where neither is given."""
+    """Unit normals, (*size, 3), from one of the two kinds of maps; None where neither is given."""
     if normal_map is not None and height_map is not None:
         raise UsageError("--normals and --height are two ways to say one thing: give one of them")
     if (height_map is None) != (relief is None) or (height_map is None) != (pitch is None):
         raise UsageError("--height, --relief and --pixel-pitch belong together")
     if normal_map is not None:
-        return images.read_normal_map(normal_map, "opengl" if green == "up" else "directx")
+        return images.read_normal_map(normal_map, "opengl" if green == "up" else "directx", size)
     if height_map is None or relief is None or pitch is None:
         return None
-    return images.height_to_normals(images.read_height_map(height_map, relief), pitch)
+    return images.height_to_normals(images.read_height_map(height_map, relief, size=size), pitch)
 
 
 def _effects(effects: str | None, left_out: str | None) -> str | list[str]:
@@ -222,8 +223,8 @@ def command(
         raise UsageError("a cluster reads one image: leave --normals and --height out, or --cluster")
     if cluster is not None and image.suffix.lower() == EXR_SUFFIX:
         raise UsageError(f"a cluster reads TIFFs, whose blocks can be found one by one; found {image}")
-    normals = _relief(normal_map, green, height_map, relief, pitch)
     with open_image(image, samples) as opened:
+        normals = _relief(normal_map, green, height_map, relief, pitch, (opened.height, opened.width))
         declared = name_list(channels) if channels is not None else None
         source: ImageSource = opened
         if normals is not None:

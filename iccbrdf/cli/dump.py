@@ -14,6 +14,8 @@ from iccbrdf.icc.layout import shown
 from iccbrdf.icc.source_tag import Source, readable_source
 from iccbrdf.icc.text import printable
 
+SCHEMA = "iccbrdf.dump/1"
+
 EPILOG = """
 \b
 Example:
@@ -33,8 +35,10 @@ def command(file: Path, as_json: bool) -> None:
     profile = read_profile(file)
     source = readable_source(profile, profile.source)
     named = _listing(profile, source)
-    result = {**to_dict(profile, listing=named), "made_from": source.plain()}
-    emit(as_json, "iccbrdf.dump/1", result, describe(profile, listing=named) + "".join(_lines(source)))
+    if as_json:
+        emit(True, SCHEMA, {**to_dict(profile, listing=named), "made_from": source.plain()}, "")
+    else:
+        emit(False, SCHEMA, {}, describe(profile, listing=named) + "".join(_lines(source)))
 
 
 def _listing(profile: Profile, source: Source) -> Callable[[Program], str]:

@@ -16,6 +16,7 @@ from iccbrdf.brdf.geometry import Array
 from iccbrdf.brdf.models import MODELS
 from iccbrdf.brdf.primaries import REFRACTIVE_INDEX, Primaries, Primary, write_primaries
 from iccbrdf.cli.options import CHECK_FAILED, FiniteRange, emit, force_option, json_option, name_list
+from iccbrdf.cli.progress import progress
 from iccbrdf.errors import InputError, UsageError, nearest
 from iccbrdf.files import check_target
 from iccbrdf.measure import (
@@ -115,7 +116,8 @@ def command(
     if index is not None and not MODELS[model].has_fresnel:
         raise UsageError(f"--refractive-index: {model} has none")
     declaration = read_declarations(declarations) if declarations else {}
-    measured = read_measurements(table, **{**declaration, **parse_declarations(declared)})
+    with progress(f"reading {table}"):
+        measured = read_measurements(table, **{**declaration, **parse_declarations(declared)})
     measured = _selected(measured, name_list(patches) if patches is not None else None, max_angle)
     settings: dict[str, Any] = {
         "model": model,
@@ -128,7 +130,8 @@ def command(
 
     def fitted(**more: Any) -> FitResult:
         arrays = measured.XYZ, measured.light, measured.view, measured.white
-        return fit(*arrays, **{"solver": solver, "as_published": as_published, **settings, **more})
+        with progress(f"fitting {len(measured.patches)} patches in {measured.theta_i.size} geometries"):
+            return fit(*arrays, **{"solver": solver, "as_published": as_published, **settings, **more})
 
     if settings["refractive_index"] == "free":
         # One coat covers the print, and a primaries file holds one index.

@@ -11,6 +11,8 @@ from contextlib import contextmanager
 def progress(label: str) -> Iterator[Callable[[int, int], None]]:
     """A bar where stderr is a terminal; gives what is told how many pixels more are done, and of how many.
 
+    Until that is told, the bar only says that something goes on.
+
     Parameters
     ----------
     label

@@ -18,9 +18,12 @@ CONVENTIONS: tuple[Convention, ...] = ("opengl", "directx")
 
 # Grey in 8 bits, 127 or 128, decodes to a vector of length 0.007, which is no direction but rounding.
 _SHORTEST = 0.02
+_BAND_PIXELS = 1 << 22
 
 
-def read_normal_map(path: StrPath, convention: Convention = "opengl") -> Array:
+def read_normal_map(
+    path: StrPath, convention: Convention = "opengl", size: tuple[int, int] | None = None
+) -> Array:
     """Read a normal map: RGB (an alpha channel is ignored), a component n stored as (n + 1)/2.
 
     Parameters
@@ -29,6 +32,8 @@ def read_normal_map(path: StrPath, convention: Convention = "opengl") -> Array:
         PNG or TIFF, 8 or 16 bits, or float in 0..1.
     convention
         Which way green points: "opengl" to the top of the image, "directx" to its bottom.
+    size
+        The height and width that it must have.
 
     Returns
     -------
@@ -50,7 +55,7 @@ def read_normal_map(path: StrPath, convention: Convention = "opengl") -> Array:
     if convention not in CONVENTIONS:
         hint = nearest(convention, CONVENTIONS)
         raise UsageError(f"{path}: unknown normal map convention {convention!r}: {hint}")
-    picture = read_picture(path, "device")
+    picture = read_picture(path, "device", size)
     if picture.shape[2] not in (3, 4):
         raise InputError(f"{path}: {picture.shape[2]} channels, expected a normal map in red, green and blue")
     if not (picture.min() >= 0 and picture.max() <= 1):
@@ -74,7 +79,9 @@ def read_normal_map(path: StrPath, convention: Convention = "opengl") -> Array:
     return normals
 
 
-def read_height_map(path: StrPath, scale: float = 1.0, samples: Samples | None = None) -> Array:
+def read_height_map(
+    path: StrPath, scale: float = 1.0, samples: Samples | None = None, size: tuple[int, int] | None = None
+) -> Array:
     """Read a height map, one channel.
 
     Parameters
@@ -85,6 +92,8 @@ def read_height_map(path: StrPath, scale: float = 1.0, samples: Samples | None =
         What 1 stands for, in the unit of the pixel pitch: for integers the height of white above black.
     samples
         As in `open_tiff`: a float TIFF whose heights leave 0..1 wants "real".
+    size
+        The height and width that it must have.
 
     Returns
     -------
@@ -96,7 +105,7 @@ def read_height_map(path: StrPath, scale: float = 1.0, samples: Samples | None =
     InputError
         As `iccbrdf.images.pictures.read_picture`, or more than one channel.
     """
-    picture = read_picture(path, samples)
+    picture = read_picture(path, samples, size)
     if picture.shape[2] != 1:
         raise InputError(f"{path}: {picture.shape[2]} channels, expected a height map in grey")
     heights: Array = picture[:, :, 0] * np.float32(scale)
@@ -134,6 +143,17 @@ def height_to_normals(height: Array, pitch: float) -> Array:
         raise InputError(f"heights of shape {np.shape(height)}, expected (height, width)")
     # Differences of unsigned integers would wrap around.
     height = np.asarray(height, np.result_type(height, np.float32))
+    normals = np.empty((*height.shape, 3), np.float32)
+    # Band by band, as what comes in between takes twice the memory of the normals.
+    rows = max(1, _BAND_PIXELS // max(1, height.shape[1]))
+    for y0 in range(0, len(height), rows):
+        above, below = max(0, y0 - 1), y0 + rows + 1
+        inner = slice(y0 - above, y0 - above + rows)
+        normals[y0 : y0 + rows] = _normals(height[above:below], pitch)[inner]
+    return normals
+
+
+def _normals(height: Array, pitch: float) -> Array:
     normals = np.empty((*height.shape, 3), np.float32)
     normals[:, :, 0] = -_slope(height, pitch, axis=1)
     normals[:, :, 1] = _slope(height, pitch, axis=0)

@@ -27,6 +27,7 @@ MAX_CHANNELS = 256
 MAX_PAGES = 64
 """Thumbnails and other reductions included.  Those of a damaged file may point to each other for ever."""
 
+_FLOAT_PREDICTOR = 3
 _DTYPES = ("u1", "u2", "f2", "f4", "f8")
 _PHOTOMETRICS = ("MINISBLACK", "RGB", "SEPARATED")
 LAB_PHOTOMETRICS = ("CIELAB", "ICCLAB")
@@ -91,6 +92,8 @@ class TiffStorage:
                 f"the limit is {MAX_SAMPLES} samples"
             )
         self.dtype = _sample_type(page, self._file.byteorder, path)
+        if page.predictor == _FLOAT_PREDICTOR and self.dtype.kind != "f":
+            raise InputError(f"{path}: damaged TIFF: predictor {_FLOAT_PREDICTOR}, of floats, on integers")
         self.description: str = page.description
         self.profile: bytes | None = page.iccprofile
         if not isinstance(self.profile, bytes | None):

@@ -18,12 +18,13 @@ from typing import Any
 import numpy as np
 
 from iccbrdf.brdf.geometry import Array
-from iccbrdf.errors import InputError
+from iccbrdf.errors import InputError, LimitError
 from iccbrdf.files import StrPath, read_whole
 from iccbrdf.measure.declarations import SCHEMA, header_declarations
 
 MAX_BYTES = 1 << 27
 """Of a table's text, which takes up to twenty times its bytes in memory."""
+MAX_COLUMNS = 1 << 16
 MISSING = ("", "nan", "-", "n/a", "na")
 """What stands for a reading that is not there, in lower case."""
 
@@ -102,6 +103,8 @@ def read_csv(path: StrPath, delimiter: str) -> Table:
     ------
     InputError
         No columns or rows, a name that stands twice, or a row of another length than the first line.
+    LimitError
+        A line of more than MAX_COLUMNS.
     """
     lines = read_text(path).split("\n")
     start = next((k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")), len(lines))
@@ -109,6 +112,8 @@ def read_csv(path: StrPath, delimiter: str) -> Table:
     header = {}
     if comments and _HEADER.match(comments[0]):
         header = header_declarations("\n".join(line[1:].strip() for line in comments), path)
+    if any(line.count(delimiter) >= MAX_COLUMNS for line in lines[start:]):
+        raise LimitError(f"{path}: a line has more columns than the limit of {MAX_COLUMNS}")
     reader = csv.reader((f"{line}\n" for line in lines[start:]), delimiter=delimiter)
     rows, numbers, line = [], [], start
     try:
