@@ -19,13 +19,21 @@ from iccbrdf.brdf.primaries import read_primaries
 from iccbrdf.calc import compile_template
 from iccbrdf.calc.program import Op
 from iccbrdf.cmm.environment import checked_environment
-from iccbrdf.errors import InputError, LimitError, ProfileError, UnsupportedError, VariableError
+from iccbrdf.errors import (
+    InputError,
+    LimitError,
+    ProfileError,
+    UnsupportedError,
+    VariableError,
+    nearest,
+)
 from iccbrdf.icc import (
     TAGS,
     XYZ,
     Calculator,
     Clut,
     Curve,
+    EmbeddedProfile,
     ExtendedClut,
     MultiProcess,
     NumberArray,
@@ -38,8 +46,8 @@ from iccbrdf.icc import (
 )
 from iccbrdf.icc.compare import compare
 from iccbrdf.icc.layout import Record
-from iccbrdf.icc.xml import node, profile_from_xml
-from iccbrdf.images import open_tiff
+from iccbrdf.icc.xml import forms, language, node, profile_from_xml, profile_to_xml
+from iccbrdf.images import height_to_normals, normals, open_tiff, read_height_map, read_normal_map
 from iccbrdf.images.exr import open_exr
 from iccbrdf.images.exr_header import check_header
 from iccbrdf.measure import declarations, parse_declarations, read_declarations, read_measurements, tables
@@ -283,6 +291,105 @@ def test_a_table_that_is_applied_many_times_is_looked_at_few(monkeypatch):
     for _ in range(3):
         transform([[0.5, 0.5, 0.5]])
     assert sum(isinstance(record, Clut) for record in made) <= 8
+
+
+def test_names_in_messages_are_few_short_and_printable():
+    """Millions of names were compared one by one, and shown as they were."""
+    with time_limit(5):
+        found = nearest("xyz", [f"n{i}" for i in range(300_000)])
+    assert found.startswith("valid are n0, n1, ")
+    assert found.endswith("n99, ...")
+    assert nearest("x" * 10**6, ["a" * 10**6, "b\a"]) == "valid are 'b\\x07', ..."
+    assert nearest("x", []) == "there are none"
+    assert nearest("Cyna", ["Magenta", "Cyan"]) == "did you mean 'Cyan'?"
+
+
+def test_elements_with_many_attributes():
+    """To take them took the square of their number."""
+    many = " ".join(f'a{i}="1"' for i in range(50_000))
+    with time_limit(5), pytest.raises(LimitError, match="<Header>: more than 256 attributes"):
+        profile_from_xml(seeds.xml()[0].replace(b"<Header>", f"<Header {many}>".encode()))
+
+
+def test_a_pipe_that_a_file_names(tmp_path):
+    """The reader waited for ever."""
+    os.mkfifo(tmp_path / "a.imp")
+    os.mkfifo(tmp_path / "proof.json")
+    imports = b'<Imports><Import Filename="a.imp"/></Imports><MainFunction>'
+    data = next(xml for xml in seeds.xml() if b"<MainFunction>" in xml and b"<Imports>" not in xml)
+    with pytest.raises(InputError, match=r"a\.imp: is not a regular file"):
+        profile_from_xml(data.replace(b"<MainFunction>", imports, 1), folder=tmp_path)
+    with pytest.raises(InputError, match=r"proof\.json: is not a regular file"):
+        read_folder(tmp_path)
+
+
+def test_main_functions_have_a_limit(monkeypatch):
+    """Millions of operations were made, of which a tag may have some hundred thousand."""
+    monkeypatch.setattr(language, "MAX_MAIN_WORDS", 20)
+    data = next(xml for xml in seeds.xml() if b"<MainFunction>" in xml)
+    with pytest.raises(LimitError, match="main functions have more than 20 words"):
+        profile_from_xml(data.replace(b"<MainFunction>", b"<MainFunction>" + b" 1 pop" * 11, 1))
+
+
+def test_profiles_inside_profiles_have_a_limit_in_xml(monkeypatch):
+    """Each of many small ones takes as long as a document."""
+    inner = device_profile("scnr")
+    profile = device_profile("scnr", **{f"t{i:03}": EmbeddedProfile.of(inner) for i in range(3)})
+    data = profile_to_xml(profile)
+    monkeypatch.setattr("iccbrdf.icc.xml.whole.MAX_PROFILES", 2)
+    with pytest.raises(LimitError, match="more than 2 profiles inside profiles"):
+        profile_from_xml(data)
+    with pytest.raises(LimitError, match="more than 2 profiles inside profiles"):
+        profile_to_xml(profile)
+
+
+def test_numbers_that_xml_does_not_hold_are_not_made_text(monkeypatch):
+    """It took a gigabyte to say that they are too many."""
+    monkeypatch.setattr(forms, "decimals", None)
+    profile = device_profile("scnr", t000=NumberArray("fl32", np.zeros(5_000_001)))
+    with pytest.raises(LimitError, match="10000001 characters, but XML readers take 10000000"):
+        profile_to_xml(profile)
+
+
+def test_a_map_of_another_size_is_not_unpacked(tmp_path):
+    """A small file that holds 2^28 pixels was unpacked for an image of a few."""
+    path = tmp_path / "a.png"
+    head = struct.pack(">IIBBBBB", 16384, 16384, 8, 0, 0, 0, 0)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + struct.pack(">I4s", 13, b"IHDR") + head)
+    for read in (read_height_map, read_normal_map):
+        with pytest.raises(
+            InputError, match="the relief has 16384 x 16384 pixels, expected the image's 8 x 4"
+        ):
+            read(path, size=(4, 8))
+
+
+def test_normals_are_made_band_by_band(monkeypatch):
+    """What came in between took twice the memory of the normals."""
+    heights = np.random.default_rng(0).random((23, 7), np.float32)
+    whole = height_to_normals(heights, 0.5)
+    for pixels in (1, 7, 8, 30, 150):
+        monkeypatch.setattr(normals, "_BAND_PIXELS", pixels)
+        np.testing.assert_array_equal(height_to_normals(heights, 0.5), whole)
+
+
+def test_a_predictor_of_floats_on_integers(tmp_path):
+    """It was undone as if it were one, to other numbers than the file's."""
+    tifffile.imwrite(
+        tmp_path / "a.tif", np.zeros((4, 5, 3), np.uint16), compression="deflate", predictor=True
+    )
+    data = bytearray((tmp_path / "a.tif").read_bytes())
+    at = data.index(struct.pack("<HHI", 317, 3, 1)) + 8
+    data[at] = 3
+    (tmp_path / "a.tif").write_bytes(data)
+    with pytest.raises(InputError, match=r"a\.tif: damaged TIFF: predictor 3, of floats, on integers"):
+        open_tiff(tmp_path / "a.tif")
+
+
+def test_lines_of_a_table_have_a_limit(tmp_path):
+    """A line of commas alone took ten times its bytes."""
+    (tmp_path / "a.csv").write_text("," * tables.MAX_COLUMNS)
+    with pytest.raises(LimitError, match="a line has more columns than the limit of 65536"):
+        read_measurements(tmp_path / "a.csv")
 
 
 def test_what_took_the_square_of_its_size(tmp_path):
