@@ -404,6 +404,9 @@ def test_what_took_the_square_of_its_size(tmp_path):
     for read, path in ((job.read_job, keys), (read_declarations, keys), (read_measurements, header)):
         with pytest.raises(LimitError, match="larger than the limit of 65536"):
             read(path)
+    keys.write_text("a." * 30_000 + "b = 1")
+    with pytest.raises(InputError, match="a key of 100 parts"):
+        job.read_job(keys)
     wide.write_text(f"a,{names},a,c7\n" + ",".join(["1"] * 20_003))
     with pytest.raises(InputError, match="the column 'a' stands twice"):
         read_measurements(wide)
