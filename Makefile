@@ -14,8 +14,9 @@ $(VENV)/installed: pyproject.toml
 demo: $(VENV)/installed
 	$(BIN)/iccbrdf demo -o demo --force
 
+# Where Python may not keep what it compiles, each worker and each command that a test starts does it anew.
 test: lint types
-	$(BIN)/python -m pytest
+	env -u PYTHONDONTWRITEBYTECODE $(BIN)/python -m pytest
 
 lint: $(VENV)/installed
 	$(BIN)/ruff check .
