@@ -20,7 +20,7 @@ _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _RGB = 2
 _SUB = 1
 _LEVEL = 3
-"""Of zlib.  Softproofs are written in half the time of its default, 6, and larger by two hundredths at most."""
+"""Of zlib.  Softproofs are written in half the time of its default, 6, and are 2 % larger at most."""
 
 
 class PngWriter:
