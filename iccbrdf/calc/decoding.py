@@ -15,7 +15,7 @@ from iccbrdf.calc.program import Program, parse
 from iccbrdf.calc.verify import verify_element
 from iccbrdf.errors import IccBrdfError
 
-_OPERATORS = frozenset(("in", "data", "mul", "add", "out"))
+_OPERATORS = frozenset(("in", "data", "copy", "mul", "add", "out"))
 """Of programs that decode; one with others is not looked at."""
 
 
@@ -42,9 +42,14 @@ class Decoding:
             (first, factor, offset), size = run[0], len(run)
             yield f"in({first},{size})"
             if factor != 1:
-                yield f"{factor!r} " * size + f"mul({size})"
+                yield f"{_repeated(factor, size)} mul({size})"
             if offset != 0:
-                yield f"{offset!r} " * size + f"add({size})"
+                yield f"{_repeated(offset, size)} add({size})"
+
+
+def _repeated(number: float, size: int) -> str:
+    """Operators that leave a number so many times on the stack."""
+    return f"{number!r} copy(1,{size - 1})" if size > 2 else " ".join([repr(number)] * size)
 
 
 def decoding_of(element: Any) -> Decoding | None:
@@ -92,9 +97,7 @@ def _parted(node: Node, op: str, neutral: float) -> tuple[Node, float]:
     return node, neutral
 
 
-def _distinct(
-    sources: Sequence[int], factors: Sequence[float], offsets: Sequence[float]
-) -> Decoding | None:
+def _distinct(sources: Sequence[int], factors: Sequence[float], offsets: Sequence[float]) -> Decoding | None:
     if len(set(sources)) < len(sources):
         return None
     return Decoding(tuple(sources), tuple(factors), tuple(offsets))
