@@ -41,6 +41,12 @@ def read_whole(path: StrPath, most: int) -> bytes:
     return data
 
 
+def check_regular(path: Path) -> None:
+    """InputError where there is something else than a regular file: pipes and devices never end."""
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is not a regular file")
+
+
 def check_target(path: StrPath, *, overwrite: bool = False) -> Path:
     """The real path of an output file, after the checks that can be made before any work is done.
 

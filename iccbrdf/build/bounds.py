@@ -145,35 +145,22 @@ def columns(reflection: Reflection, planes: Planes) -> Columns:
     return Columns(d, ks, m, Rd, _less(ks, of_Y(ks)), _less(m, of_Y(m)))
 
 
+def _span_of(family: str) -> cached_property[Span]:
+    return cached_property(lambda parameters: parameters.reduce(getattr(parameters.pixels, family)))
+
+
 class Parameters:
     """The spans of columns, each of shape (3, n) or (1, n), taken when it is first asked for."""
 
     def __init__(self, pixels: Columns, reduce: Reduce) -> None:
-        self._pixels, self._reduce = pixels, reduce
+        self.pixels, self.reduce = pixels, reduce
 
-    @cached_property
-    def d(self) -> Span:
-        return self._reduce(self._pixels.d)
-
-    @cached_property
-    def ks(self) -> Span:
-        return self._reduce(self._pixels.ks)
-
-    @cached_property
-    def m(self) -> Span:
-        return self._reduce(self._pixels.m)
-
-    @cached_property
-    def Rd(self) -> Span:
-        return self._reduce(self._pixels.Rd)
-
-    @cached_property
-    def ks_off(self) -> Span:
-        return self._reduce(self._pixels.ks_off)
-
-    @cached_property
-    def m_off(self) -> Span:
-        return self._reduce(self._pixels.m_off)
+    d = _span_of("d")
+    ks = _span_of("ks")
+    m = _span_of("m")
+    Rd = _span_of("Rd")
+    ks_off = _span_of("ks_off")
+    m_off = _span_of("m_off")
 
 
 def differences(one: Columns, other: Columns) -> Columns:

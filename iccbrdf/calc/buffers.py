@@ -162,18 +162,18 @@ def direct(steps: Steps) -> Steps:
     for last in steps:
         if not isinstance(last, Step) or last.writes[0].register.kind is not Kind.OUTPUT:
             continue
-        middle = source(last)
-        if middle is None:
+        path = [last]
+        while len(path) < 3 and (before := source(path[-1])) is not None:
+            path.append(before)
+        if len(path) == 1:
             continue
-        first = source(middle)
-        path = [middle] if first is None else [middle, first]
-        (channel, *others) = path[-1].reads
+        channel, *others = path[-1].reads
         if others or not isinstance(channel, Place) or channel.register.kind is not Kind.INPUT:
             continue
-        function = middle if first is not None else last
+        function = path[-2]
         through = tuple(channel if operand in sources else operand for operand in function.reads)
         shorter[id(last)] = Step(function.function, through, last.writes)
-        spared.update(map(id, path))
+        spared.update(map(id, path[1:]))
     return [shorter.get(id(step), step) for step in steps if id(step) not in spared]
 
 

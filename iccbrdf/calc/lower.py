@@ -250,9 +250,9 @@ class _Lowering:
         default = self._expressions.known(declared.default, self._globals, f"the default of {name}")
         if len(default) != 1:
             raise declared.place.error(f"the default of {name} has {len(default)} components, expected 1")
-        given = _numbers(self._variables.get(name, default[0]), 1)
+        found = self._variables.get(name, default[0])
+        given = _numbers(found, 1)
         if given is None or len(given) != 1:
-            found = self._variables.get(name, default[0])
             raise declared.place.error(f"{name} is {found!r}; expected 1 finite number (float32)")
         self._result.variables[name] = float(given[0])
         return self._called(name, self._graph.env(name, float(given[0])))

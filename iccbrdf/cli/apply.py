@@ -9,9 +9,9 @@ import click
 
 from iccbrdf import images
 from iccbrdf.build import image_link, last_slope
+from iccbrdf.cli.chain import chain_options
 from iccbrdf.cli.options import (
     backend_option,
-    chain_options,
     emit,
     environment,
     force_option,

@@ -8,7 +8,8 @@ from typing import Any
 
 import click
 
-from iccbrdf.cli.options import chain_options, emit, json_option
+from iccbrdf.cli.chain import chain_options
+from iccbrdf.cli.options import emit, json_option
 from iccbrdf.cmm import link
 from iccbrdf.cmm.ramps import has_tints, named_colours
 from iccbrdf.errors import UsageError, nearest

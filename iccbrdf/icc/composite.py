@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from iccbrdf.icc.fields import SIGNATURE, U32, tag_layout
+from iccbrdf.icc.fields import SIGNATURE, U32, tag_layout, utf16_text
 from iccbrdf.icc.layout import Field, FieldType, Record, Seen, shown
 from iccbrdf.icc.reader import Reader
 from iccbrdf.icc.tags import TAGS, Mluc
@@ -105,7 +105,7 @@ class _Entries(FieldType):
         parts = reader.parts(
             [spans[index] for index in stored],
             lambda i: f"record {stored[i] // columns}",
-            lambda part, i: self._localised(part) if stored[i] % columns > 1 else self._text(part),
+            lambda part, i: self._localised(part) if stored[i] % columns > 1 else utf16_text(part),
         )
         values: dict[int, Any] = dict(zip(stored, parts, strict=True))
         # A text that begins somewhere but has no size is there and empty.
@@ -114,14 +114,6 @@ class _Entries(FieldType):
         return tuple(
             Entry(values.get(row, ""), *(values.get(row + i) for i in range(1, columns))) for row in rows
         )
-
-    @staticmethod
-    def _text(reader: Reader) -> str:
-        reader.count_bytes(reader.left)
-        try:
-            return bytes(reader.take(reader.left, "text")).decode("utf-16-be")
-        except UnicodeDecodeError as error:
-            raise reader.error(f"found bytes that are no UTF-16 ({error.reason})", at=error.start) from None
 
     @staticmethod
     def _localised(reader: Reader) -> Mluc:

@@ -97,6 +97,15 @@ class Bytes(FieldType):
         return bytes(value)
 
 
+def utf16_text(reader: Reader) -> str:
+    """All of a window as UTF-16, any NUL characters included."""
+    reader.count_bytes(reader.left)
+    try:
+        return bytes(reader.take(reader.left, "text")).decode("utf-16-be")
+    except UnicodeDecodeError as error:
+        raise reader.error(f"found bytes that are no UTF-16 ({error.reason})", at=error.start) from None
+
+
 class Text(FieldType):
     """Text to the end of the structure, without the NUL characters that may end it."""
 

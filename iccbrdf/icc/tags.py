@@ -30,6 +30,7 @@ from iccbrdf.icc.fields import (
     Text,
     frozen,
     tag_layout,
+    utf16_text,
 )
 from iccbrdf.icc.layout import Field, FieldType, Layout, Record, Registry, Seen
 from iccbrdf.icc.reader import Reader
@@ -162,19 +163,12 @@ class _LocalisedTexts(FieldType):
     def read(self, reader: Reader, name: str, seen: Seen) -> tuple[LocalisedText, ...]:
         table = reader.take(self._record.size * seen["count"], "text records")
         heads = list(self._record.iter_unpack(table))
-        texts = iter(reader.parts([(o, n) for *_, n, o in heads if n], lambda i: f"text {i}", self._text))
+        spans = [(offset, size) for *_, size, offset in heads if size]
+        texts = iter(reader.parts(spans, lambda i: f"text {i}", lambda part, _: utf16_text(part)))
         return tuple(
             LocalisedText(lang.decode("latin-1"), country.decode("latin-1"), next(texts) if size else "")
             for lang, country, size, _ in heads
         )
-
-    @staticmethod
-    def _text(reader: Reader, index: int) -> str:
-        reader.count_bytes(reader.left)
-        try:
-            return bytes(reader.take(reader.left, "text")).decode("utf-16-be")
-        except UnicodeDecodeError as error:
-            raise reader.error(f"found bytes that are no UTF-16 ({error.reason})", at=error.start) from None
 
     def write(self, out: bytearray, value: Sequence[LocalisedText], record: Any) -> None:
         start = len(out) + self._record.size * len(value)

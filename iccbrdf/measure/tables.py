@@ -23,7 +23,7 @@ from iccbrdf.files import StrPath, read_whole
 from iccbrdf.measure.declarations import SCHEMA, header_declarations
 
 MAX_BYTES = 1 << 27
-"""Of a table's text, which takes up to twenty times its bytes in memory."""
+"""Of a table's text, which takes up to some 35 times its bytes in memory, fit included."""
 MAX_COLUMNS = 1 << 16
 MISSING = ("", "nan", "-", "n/a", "na")
 """What stands for a reading that is not there, in lower case."""

@@ -13,7 +13,7 @@ from typing import Any
 
 import iccbrdf
 from iccbrdf.errors import IccBrdfError, InputError
-from iccbrdf.files import read_whole
+from iccbrdf.files import check_regular, read_whole
 from iccbrdf.images.showing import DISPLAYS
 from iccbrdf.proof.job import Job
 
@@ -89,9 +89,7 @@ def earlier(job: Job, expected: str) -> dict[str, Any] | None:
 
 def _hashed(path: Path) -> dict[str, Any]:
     digest = hashlib.sha256()
-    # A job may name devices, which never end.
-    if path.exists() and not path.is_file():
-        raise InputError(f"{path}: is not a regular file")
+    check_regular(path)
     try:
         with path.open("rb") as file:
             while piece := file.read(1 << 20):

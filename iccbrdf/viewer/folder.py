@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iccbrdf.errors import InputError
-from iccbrdf.files import read_whole
+from iccbrdf.files import check_regular, read_whole
 from iccbrdf.viewer.page import Start
 
 LOG = "proof.json"
@@ -50,9 +50,7 @@ def read_folder(folder: Path) -> ProofFolder:
     LimitError where the log is larger than MAX_BYTES.
     """
     try:
-        # A folder from a stranger may hold a pipe, which never ends.
-        if (folder / LOG).exists() and not (folder / LOG).is_file():
-            raise InputError(f"{folder / LOG}: is not a regular file")
+        check_regular(folder / LOG)
         log = json.loads(read_whole(folder / LOG, MAX_BYTES))
         job, scene = log["job"], log["scenes"][0]
         env = {str(name): _finite(value) for name, value in scene["env"].items()}

@@ -19,6 +19,7 @@ from iccbrdf.errors import (
     UnsupportedError,
     nearest,
 )
+from iccbrdf.files import check_regular
 from iccbrdf.icc.source_tag import CalculatorSource
 from iccbrdf.icc.xml.values import Codec, Odd
 
@@ -90,19 +91,15 @@ class Document:
         folder = self.folder.resolve()
         try:
             path = (folder / filename).resolve()
-            special = path.exists() and not path.is_file()
-        except (OSError, ValueError, RuntimeError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise node.error(f"found the file name {filename!r:.200}: {reason}") from None
-        if not path.is_relative_to(folder):
-            raise node.error(f"found the file name {filename!r:.200}, expected one inside {folder}")
-        # A pipe never ends.
-        if special:
-            raise node.error(f"{path}: is not a regular file", kind=InputError)
-        try:
+            if not path.is_relative_to(folder):
+                raise node.error(f"found the file name {filename!r:.200}, expected one inside {folder}")
+            check_regular(path)
             return path, self.read(path)
         except InputError as error:
             raise node.error(str(error), kind=InputError) from None
+        except (OSError, ValueError, RuntimeError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise node.error(f"found the file name {filename!r:.200}: {reason}") from None
 
 
 def parse(data: bytes, source: str, document: Document) -> Node:
