@@ -199,7 +199,10 @@ class _Missing:
         if node.op in _OF_NAN:
             return [writer.declaration(node, f"({some} ? {literal(_OF_NAN[node.op])} : {own})")]
         if node.op in ("vmin", "vmax"):
-            line = writer.declaration(node, f"(({some}) ? {texts[1]} : {own})")
+            # One condition: drivers make branches of conditions in conditions, and take long over them.
+            sign = "<" if node.op == "vmin" else ">"
+            least = f"(!({some}) && {texts[0]} {sign} {texts[1]} ? {texts[0]} : {texts[1]})"
+            line = writer.declaration(node, least)
             return [line, self.flagged(node, flags[1])] if flags[1] else [line]
         if node.op == "select":
             some = f"{texts[0]} ? {flags[1] or 'false'} : {flags[2] or 'false'}"
