@@ -48,8 +48,13 @@ class Promise(NamedTuple):
     """Whether more is promised below that cosine, as one over the cosine, and not nothing.
 
     Directions of length 1 in float32 are uncertain by 1e-7.  That is a relative error of 1e-7 / cos of a
-    cosine, and as much of the half vector where light and viewer graze a surface from opposite sides.
+    cosine, and as much of the half vector where light and viewer graze a surface from opposite sides.  In
+    the exact geometry it does not grow.
     """
+
+    def from_cosine(self, geometry: str) -> float:
+        """The least cosine for which the error itself is promised."""
+        return LEAST_COSINE if geometry == "exact" and self.grows else self.least_cosine
 
 
 GRAZING = 0.02
@@ -63,17 +68,17 @@ PROMISES = (
 )
 
 LEAST_COSINE = 1e-7
-"""Below it the sign of a cosine is lost in float32, and with it what is lit."""
+"""Below it nothing is promised: in the plain geometry a cosine's sign is lost, and with it what is lit."""
 
 NOTHING_LEFT = 0.5
 """A promise that has grown to this is none: the exponent of a lobe is known to no digit, and is one of e."""
 
 
-def promised(m: Array, cosine: Array) -> Array:
+def promised(m: Array, cosine: Array, geometry: str = "plain") -> Array:
     """The largest relative error by m and cosine, which broadcast; infinite where nothing is promised."""
     error = np.full(np.broadcast_shapes(m.shape, cosine.shape), np.inf)
     for promise in PROMISES:
-        growth = np.maximum(1, promise.least_cosine / np.maximum(cosine, LEAST_COSINE))
+        growth = np.maximum(1, promise.from_cosine(geometry) / np.maximum(cosine, LEAST_COSINE))
         holds = (m >= promise.least_m) & (promise.grows | (growth == 1))
         error = np.where(holds, np.minimum(error, promise.error * growth), error)
     return np.where((error < NOTHING_LEFT) & (cosine >= LEAST_COSINE), error, np.inf)
@@ -93,9 +98,9 @@ def primaries(model: str) -> Primaries:
 
 
 @cache
-def mvis_of(model: str, fresnel_angle: str | None = None) -> Profile:
+def mvis_of(model: str, fresnel_angle: str | None = None, geometry: str = "plain") -> Profile:
     """A model's MVIS."""
-    return build_pair(primaries(model), fresnel_angle=fresnel_angle).mvis
+    return build_pair(primaries(model), fresnel_angle=fresnel_angle, geometry=geometry).mvis
 
 
 @cache
@@ -146,12 +151,12 @@ def _mirrored(rng: np.random.Generator) -> tuple[Array, Array]:
     return half + across, half - across
 
 
-def _opposite(rng: np.random.Generator) -> tuple[Array, Array]:
+def _opposite(rng: np.random.Generator, lowest: float) -> tuple[Array, Array]:
     """Light and viewer that graze some surface from opposite sides, nearly in one plane."""
     axis = _upwards(rng)
     (across,) = _at_cosine(axis, np.zeros(1), rng)
-    low, other = 10 ** rng.uniform(-3.3, -1.3, 2)
-    aside = np.cross(axis, across) * 10 ** rng.uniform(-4, -1)
+    low, other = 10 ** rng.uniform(np.log10(lowest), -1.3, 2)
+    aside = np.cross(axis, across) * 10 ** rng.uniform(np.log10(lowest), -1)
     return across + low * axis, other * axis - across + aside
 
 
@@ -180,8 +185,8 @@ def directions(rng: np.random.Generator) -> Iterator[tuple[Array, Array]]:
             (light, _level(view)),
             (np.array([0, 0, 1.0]), view),
             (_upwards(rng), _upwards(rng)),
-            _opposite(rng),
-            _opposite(rng),
+            _opposite(rng, 5e-4),
+            _opposite(rng, LEAST_COSINE),
         ):
             scaled = [v * 10 ** rng.choice([0, 0, rng.uniform(-3, 3)]) for v in pair]
             yield tuple(np.float32(v).astype(np.float64) for v in scaled)
@@ -353,6 +358,7 @@ class Look:
     """One light and one viewer on pixels of prints, which come first, and of any numbers."""
 
     model: str
+    geometry: str
     light: Array
     view: Array
     pixels: Pixels
@@ -375,6 +381,11 @@ class Look:
         """The lesser cosine of light and viewer on the prints, (n, 1)."""
         return smallest_cosine(self.printed, self.light, self.view)[:, None]
 
+    @property
+    def promised(self) -> Array:
+        """The largest relative error that float32 may have on the prints, (n, 3)."""
+        return promised(self.m, self.cosine, self.geometry)
+
     def as_printed(self) -> Array:
         """XYZ of the prints in float32 by the papers' formulas as they stand, (n, 3)."""
         transform = printed_formulas(self.model).with_env(variables(self.light, self.view))
@@ -385,19 +396,21 @@ class Look:
         return self.XYZ[backend, dtype][: self.prints].astype(np.float64)
 
 
-def looks(model: str, geometries: int, prints_each: int, anything_each: int, seed: int) -> Iterator[Look]:
+def looks(
+    model: str, geometry: str, count: int, prints_each: int, anything_each: int, seed: int
+) -> Iterator[Look]:
     """Results of a model's MVIS under so many lights and viewers, by every back end in both number types."""
-    rng, mvis = np.random.default_rng(seed), mvis_of(model)
+    rng, mvis = np.random.default_rng(seed), mvis_of(model, geometry=geometry)
     transforms = {
         (backend, dtype): iccbrdf.link([mvis], backend=backend, dtype=dtype)
         for backend in BACKENDS
         for dtype in DTYPES
     }
     pairs = directions(rng)
-    for _ in range(geometries):
+    for _ in range(count):
         light, view = next(pairs)
         printed = prints(model, light, view, prints_each, rng)
         pixels = np.concatenate([printed, anything(printed.shape[1], anything_each, rng)])
         env = variables(light, view)
         found = {key: transform.with_env(env)(pixels) for key, transform in transforms.items()}
-        yield Look(model, light, view, pixels, prints_each, found)
+        yield Look(model, geometry, light, view, pixels, prints_each, found)

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import TypeAlias
 
@@ -49,6 +49,7 @@ from hard_examples import (  # noqa: E402  (which lies in tests)
 import iccbrdf  # noqa: E402
 from iccbrdf.brdf.models import MODELS, evaluate  # noqa: E402
 from iccbrdf.build import build_colour_mid  # noqa: E402
+from iccbrdf.build.pair import GEOMETRIES  # noqa: E402
 
 PRINTS, ANYTHING = 1800, 450
 """Pixels for each light and viewer."""
@@ -111,6 +112,7 @@ class Findings:
 class ErrorMap:
     """Errors of all models by promise and by cell of m and cosine, ours and of the printed formulas."""
 
+    geometry: str
     by_promise: dict[Promise, Both] = field(
         default_factory=lambda: {promise: (Errors(), Errors()) for promise in PROMISES}
     )
@@ -126,14 +128,18 @@ class ErrorMap:
 
     def add(self, m: Array, cosine: Array, ours: Array, printed: Array) -> None:
         classes = [
-            *(((m >= p.least_m) & (cosine >= p.least_cosine), both) for p, both in self.by_promise.items()),
+            *(
+                ((m >= p.least_m) & (cosine >= p.from_cosine(self.geometry)), both)
+                for p, both in self.by_promise.items()
+            ),
             *(((m >= low) & (m < high) & (cosine >= 0.1), both) for (low, high), both in self.by_m.items()),
         ]
         for of, both in classes:
             for kept, values in zip(both, (ours, printed), strict=True):
                 kept.add(values[of])
         for promise in PROMISES:
-            low = (m >= promise.least_m) & (cosine < promise.least_cosine) & np.isfinite(promised(m, cosine))
+            bound = promised(m, cosine, self.geometry)
+            low = (m >= promise.least_m) & (cosine < promise.least_cosine) & np.isfinite(bound)
             scaled = np.max(ours * cosine / promise.least_cosine, where=low, initial=0)
             self.grazing[promise] = max(self.grazing[promise], float(scaled))
         cell = tuple(
@@ -144,11 +150,11 @@ class ErrorMap:
             np.maximum.at(part, cell, np.minimum(values, 1e3))
 
 
-def examine(model: str, samples: int, seed: int, errors: ErrorMap) -> Findings:
+def examine(model: str, geometry: str, samples: int, seed: int, errors: ErrorMap) -> Findings:
     """A model under lights and viewers of every kind."""
-    findings = Findings(model)
-    geometries = -(-samples // (PRINTS + ANYTHING))
-    for look in looks(model, geometries, PRINTS, ANYTHING, seed):
+    findings = Findings(f"{model}, {geometry}")
+    count = -(-samples // (PRINTS + ANYTHING))
+    for look in looks(model, geometry, count, PRINTS, ANYTHING, seed):
         findings.samples += len(look.pixels)
         findings.not_finite += sum(int(np.sum(~np.isfinite(XYZ))) for XYZ in look.XYZ.values())
         for dtype in DTYPES:
@@ -156,7 +162,7 @@ def examine(model: str, samples: int, seed: int, errors: ErrorMap) -> Findings:
             differences = [relative_error(look.of_prints(b, dtype), expected).max() for b in BACKENDS]
             findings.between_back_ends[dtype] = max(findings.between_back_ends[dtype], *differences)
         findings.from_reference = max(findings.from_reference, _from_reference(look))
-        bound = promised(look.m, look.cosine)
+        bound = look.promised
         exact = look.of_prints(*DOUBLE)
         for backend in BACKENDS:
             error = relative_error(look.of_prints(backend, "float32"), exact)
@@ -237,8 +243,14 @@ cosine and a tangent (`calc_templates/*_literal.calc`).
 | m from | cosines from | promised | largest | 99.9 % | as printed: largest | 99.9 % | times ours |
 |---|---|---|---|---|---|---|---|"""
 
+EXACT = """
+With `iccbrdf build --geometry exact` the promises hold down to the horizon:
+
+| m from | cosines from | promised | largest | 99.9 % |
+|---|---|---|---|---|"""
+
 BY_ROUGHNESS = """
-By roughness alone, for cosines from .1:
+By roughness alone, for cosines from .1, in the plain geometry:
 
 | m | 99 % | largest | as printed: 99 % | largest | times ours, 99 % |
 |---|---|---|---|---|---|"""
@@ -261,8 +273,11 @@ def row(*cells: object) -> str:
     return "| " + " | ".join(f"{c:.1e}" if isinstance(c, float) else str(c) for c in cells) + " |"
 
 
-def report(models: Iterable[Findings], mids: Iterable[Findings], errors: ErrorMap) -> Iterator[str]:
-    """The lines of hard_cases.md."""
+def report(
+    models: Iterable[Findings], mids: Iterable[Findings], maps: Mapping[str, ErrorMap]
+) -> Iterator[str]:
+    """The lines of hard_cases.md; `maps` by geometry."""
+    errors = maps["plain"]
     yield INTRODUCTION
     for f in models:
         apart = (f.between_back_ends[dtype] for dtype in DTYPES)
@@ -281,6 +296,10 @@ def report(models: Iterable[Findings], mids: Iterable[Findings], errors: ErrorMa
         + ", ".join(f"{errors.grazing[p]:.1e} for m from {p.least_m:g}" for p in PROMISES if p.grows)
         + "."
     )
+    yield EXACT
+    for promise, (ours, _) in maps["exact"].by_promise.items():
+        limits = (f"{promise.least_m:g}", f"{promise.from_cosine('exact'):g}", f"{promise.error:.0e}")
+        yield row(*limits, ours.largest, ours.quantile(0.999))
     yield BY_ROUGHNESS
     for (low, high), (ours, printed) in errors.by_m.items():
         at, printed_at = ours.quantile(0.99), printed.quantile(0.99)
@@ -292,10 +311,12 @@ def report(models: Iterable[Findings], mids: Iterable[Findings], errors: ErrorMa
         yield row(f.name, f"{f.samples:,}", f.not_finite, *apart, f.from_reference)
 
 
-def draw(errors: ErrorMap, path: Path) -> None:
+def draw(maps: Mapping[str, ErrorMap], path: Path) -> None:
     """The error map: the largest relative error of each cell of m and cosine."""
-    figure, axes = plt.subplots(1, 2, figsize=(9.5, 4.2), sharey=True, constrained_layout=True)
-    for axis, cells, title in zip(axes, errors.cells, ("ours", "as printed"), strict=True):
+    figure, axes = plt.subplots(1, 3, figsize=(13, 4.2), sharey=True, constrained_layout=True)
+    shown = [(f"{geometry} geometry", geometry, errors.cells[0]) for geometry, errors in maps.items()]
+    shown.append(("as printed", "plain", maps["plain"].cells[1]))
+    for axis, (title, geometry, cells) in zip(axes, shown, strict=True):
         image = axis.pcolormesh(
             10**LOG_M,
             10**LOG_COSINES,
@@ -304,15 +325,11 @@ def draw(errors: ErrorMap, path: Path) -> None:
             cmap="magma",
         )
         for promise in PROMISES:
-            axis.plot(
-                [promise.least_m, promise.least_m, 1],
-                [1, promise.least_cosine, promise.least_cosine],
-                "w",
-                lw=0.8,
-            )
+            least_cosine = promise.from_cosine(geometry)
+            axis.plot([promise.least_m, promise.least_m, 1], [1, least_cosine, least_cosine], "w", lw=0.8)
             axis.text(
                 promise.least_m * 1.1,
-                promise.least_cosine * 1.15,
+                least_cosine * 1.15,
                 f"{promise.error:.0e}",
                 color="w",
                 fontsize=7,
@@ -333,16 +350,19 @@ def main() -> None:
     mpl.use("Agg")
     arguments.output.mkdir(exist_ok=True)
     of_colours = int(arguments.samples * OF_COLOURS)
-    errors, models, mids = ErrorMap(), [], []
-    for model in MODELS:
-        models.append(examine(model, (arguments.samples - of_colours) // len(MODELS), arguments.seed, errors))
-        print(f"{model}: {models[-1].samples:,} samples", file=sys.stderr)
+    maps = {geometry: ErrorMap(geometry) for geometry in GEOMETRIES}
+    kinds = list(product(GEOMETRIES, MODELS))
+    models, mids = [], []
+    for geometry, model in kinds:
+        samples = (arguments.samples - of_colours) // len(kinds)
+        models.append(examine(model, geometry, samples, arguments.seed, maps[geometry]))
+        print(f"{models[-1].name}: {models[-1].samples:,} samples", file=sys.stderr)
     for methods in COLOUR_MIDS:
         mids.append(examine_colours(*methods, of_colours // len(COLOUR_MIDS), arguments.seed))
         print(f"{mids[-1].name}: {mids[-1].samples:,} samples", file=sys.stderr)
-    text = "\n".join(report(models, mids, errors)) + "\n"
+    text = "\n".join(report(models, mids, maps)) + "\n"
     (arguments.output / "hard_cases.md").write_text(text, encoding="utf-8")
-    draw(errors, arguments.output / "hard_cases.png")
+    draw(maps, arguments.output / "hard_cases.png")
     print(text)
     sys.exit(int(any(f.not_finite or f.broken for f in (*models, *mids))))
 

@@ -16,10 +16,12 @@ def literal_mvis(pair: Pair, model: str) -> tuple[Profile, Compiled]:
     model: key of `MODELS`.
     """
     path = folder("calc_templates") / MODELS[model].template.replace(".calc", "_literal.calc")
+    # The papers' formulas are in one geometry, as printed.
+    constants = {name: value for name, value in pair.compiled.constants.items() if name != "geometry"}
     compiled = compile_template(
         path.read_text(encoding="utf-8"),
         filename=path.name,
-        constants=pair.compiled.constants,
+        constants=constants,
         variables=pair.compiled.variables,
     )
     program = Calculator(inputs=len(compiled.inputs), outputs=3, program=compiled.program)

@@ -26,6 +26,8 @@ from iccbrdf.resources import folder
 
 FRESNEL_ANGLES = ("theta_i", "alpha")
 """Of incidence, or between half vector and view."""
+GEOMETRIES = ("plain", "exact")
+"""How cosines and half vector are computed (calc/library.calc)."""
 
 PROGRAM_TAG = "M2B0"
 """The tag of an MVIS that holds the model."""
@@ -58,6 +60,7 @@ def build_pair(
     effects: Collection[str] | None = None,
     without: Collection[str] = (),
     fresnel_angle: str | None = None,
+    geometry: str = "plain",
     variables: Mapping[str, float] | None = None,
     device: Sequence[str] | None = None,
     note: str = "",
@@ -77,6 +80,9 @@ def build_pair(
     fresnel_angle
         `theta_i` (as printed) or `alpha` (between half vector and view: reciprocal); default: `theta_i`.
         Where the Fresnel term is left out, the angle that it has when it is put back.
+    geometry
+        `exact`: float32 keeps its digits of cosines, and of the half vector, down to the horizon, by three
+        times the operators where one of the cosines is below 1/16.  `plain`: an error of 1e-7 / cosine.
     variables
         Values of run-time variables that hold where the CMM's environment sets none.
     device
@@ -89,13 +95,15 @@ def build_pair(
     Raises
     ------
     UsageError
-        An effect or a variable is unknown, `device` lacks a channel, or `fresnel_angle` is given and the
-        model has no Fresnel term.
+        An effect or a variable is unknown, `device` lacks a channel, `geometry` is none of these, or
+        `fresnel_angle` is given and the model has no Fresnel term.
     """
     variables = variables or {}
     model = MODELS[primaries.model]
     path = folder("calc_templates") / model.template
-    constants: dict[str, Any] = {"white": primaries.white, **model.choices}
+    if geometry not in GEOMETRIES:
+        raise UsageError(f"no geometry is named {geometry!r}: {nearest(geometry, GEOMETRIES)}")
+    constants: dict[str, Any] = {"white": primaries.white, "geometry": geometry, **model.choices}
     if model.has_refractive_index:
         constants["refractive_index"] = primaries.refractive_index
     if fresnel_angle is not None:
@@ -131,6 +139,7 @@ def build_pair(
             "observer": primaries.observer,
             "white": list(primaries.white),
             **({"fresnel_angle": fresnel_angle} if fresnel_angle is not None else {}),
+            **({"geometry": geometry} if geometry != "plain" else {}),
             "variables": dict(variables),
             LEFT_OUT: [name for name, on in chosen.items() if not on],
         }

@@ -28,7 +28,7 @@ from iccbrdf.brdf.slopes import Slopes
 from iccbrdf.brdf.slopes import read_entries as read_slope_entries
 from iccbrdf.build.bounds import Reflection
 from iccbrdf.build.colour_mid import INTERPOLATIONS, SLOPE_METHODS, ColourMid, build_colour_mid
-from iccbrdf.build.pair import FRESNEL_ANGLES, Pair, build_pair
+from iccbrdf.build.pair import FRESNEL_ANGLES, GEOMETRIES, Pair, build_pair
 from iccbrdf.build.source import LEFT_OUT
 from iccbrdf.errors import InputError, ProfileError, UsageError
 from iccbrdf.icc import Profile
@@ -46,6 +46,7 @@ class Recipe:
     p: float = 2.0
     exponent: float = -1.0
     fresnel_angle: str | None = None
+    geometry: str = "plain"
     variables: Mapping[str, float] = field(default_factory=dict)
     with_source: bool = True
 
@@ -63,6 +64,7 @@ class Recipe:
             effects=effects,
             without=without,
             fresnel_angle=self.fresnel_angle,
+            geometry=self.geometry,
             variables=self.variables,
             device=device,
             note=note,
@@ -179,5 +181,6 @@ def _recipe(record: Record) -> Recipe:
         record.number("p", 1, 8) if has("p") else 2.0,
         record.number("exponent", -4, 4) if has("exponent") else -1.0,
         record.choice("fresnel_angle", FRESNEL_ANGLES) if has("fresnel_angle") else None,
+        record.choice("geometry", GEOMETRIES) if has("geometry") else "plain",
         {name: variables.number(name, -math.inf) for name in variables.values},
     )

@@ -7,13 +7,18 @@ and `norm`; `dot(a, b)`, `cross(a, b)`, `normalize(v)` (a vector of no length be
 `rotl(v, k)` (the components rotated, component k first).  `polar(x, y)` is all radii and then all angles, in
 degrees from 0 to 360; `lab(x, y, z)` all L*, then all a*, then all b*, of XYZ divided by the white's.  Other
 angles are in radians, `log` is natural, conditions are 1 and 0, and `pi` is a name that is always there.
+
+Of a normal, light and view of any lengths: `cosines(n, i, v, exact)`, `half_vector(i, v, exact)`, and both as
+`cosines_and_half_vector(n, i, v, exact)`; where `exact` is 1 and not 0, float32 keeps their digits down to
+the horizon (library.calc).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cache, reduce
+from pathlib import Path
 from typing import TypeAlias
 
 from iccbrdf.calc.graph import Graph, Node, evaluate
@@ -32,6 +37,7 @@ from iccbrdf.calc.source import (
     Slice,
     Total,
     Vector,
+    parse,
 )
 from iccbrdf.errors import LimitError, nearest
 
@@ -88,6 +94,8 @@ class Expressions:
         self._expanding: list[str] = []
         self._numbers: dict[Node, tuple[float, ...] | None] = {}
         self._work = 0
+        for definition in _library():
+            self.define(definition, {})
 
     def define(self, definition: Def, names: Mapping[str, Named]) -> None:
         """Make a function known that sees these names."""
@@ -273,7 +281,7 @@ class Expressions:
             counts, build = FUNCTIONS[name]
             self._expect_arguments(call, counts)
             return build(self, call, arguments)
-        known = [f for f in (*_EACH, *FUNCTIONS, *self._functions) if f.isidentifier()]
+        known = [f for f in (*_EACH, *FUNCTIONS, *self._functions) if f.isidentifier() and f[0] != "_"]
         raise call.place.error(f"no function is named {name!r}; {nearest(name, known)}")
 
     def _combination(self, call: Call, names: Mapping[str, Named]) -> Node:
@@ -387,6 +395,14 @@ def bind(names: dict[str, Named], place: Place, name: str, value: Named) -> None
     if name in names:
         raise place.error(f"{name!r} has a value already; a name stands for one value")
     names[name] = value
+
+
+@cache
+def _library() -> tuple[Def, ...]:
+    """The functions of the language that are written in it."""
+    path = Path(__file__).parent / "library.calc"
+    statements = parse(path.read_text(encoding="utf-8"), path.name).statements
+    return tuple(statement for statement in statements if isinstance(statement, Def))
 
 
 _UNARY = frozenset(name for name in _EACH if name.isidentifier()) - {"pow", "mod", "and", "or"}

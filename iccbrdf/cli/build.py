@@ -11,7 +11,7 @@ import click
 from iccbrdf.brdf.primaries import MIN_NODES, read_primaries
 from iccbrdf.brdf.slopes import read_slopes
 from iccbrdf.build import GRIDS, INTERPOLATIONS, SLOPE_METHODS, ColourMid, build_tables
-from iccbrdf.build.pair import FRESNEL_ANGLES
+from iccbrdf.build.pair import FRESNEL_ANGLES, GEOMETRIES
 from iccbrdf.build.recipe import Recipe
 from iccbrdf.cli.options import (
     CHECK_FAILED,
@@ -80,6 +80,9 @@ Examples:
 @click.option("--fresnel-angle", type=click.Choice(FRESNEL_ANGLES),
               help="Angle of the Fresnel term: of incidence, as printed (the default), or between half "
               "vector and view, which keeps the model reciprocal.")  # fmt: skip
+@click.option("--geometry", type=click.Choice(GEOMETRIES), default="plain", show_default=True,
+              help="exact: float32 keeps the digits of cosines and half vector down to the horizon, by "
+              "programs of three times the length, which few pixels need.")  # fmt: skip
 @scene_options
 @force_option
 @json_option
@@ -102,6 +105,7 @@ def command(
     channels: str | None,
     no_source: bool,
     fresnel_angle: str | None,
+    geometry: Literal["plain", "exact"],
     light: str | None,
     view: str | None,
     env: tuple[str, ...],
@@ -137,6 +141,7 @@ def command(
         p,
         exponent,
         fresnel_angle,
+        geometry,
         environment(light, view, env),
         with_source=not no_source,
     )
