@@ -128,6 +128,7 @@ def test_the_recipe_of_a_pair_is_without_the_primaries():
         (lambda: with_recipe({"white": [1, 1]}), ProfileError, "white has 2 numbers, expected 3"),
         (lambda: with_recipe({"variables": {"litI": "2"}}), ProfileError, "litI is \"2\", expected a number"),
         (lambda: with_recipe({"fresnel_angle": 1}), ProfileError, "fresnel_angle is 1, expected a text"),
+        (lambda: with_recipe({"geometry": "exakt"}), ProfileError, "unknown geometry 'exakt': did you mean"),
     ],
 )
 def test_profiles_without_a_recipe_are_refused(profiles, error, message):
@@ -175,6 +176,17 @@ def test_the_angle_of_a_fresnel_term_that_is_left_out_is_kept():
     assert recipe_of_profiles([recipe.pair().mid, fewer]).fresnel_angle == "alpha"
     (again,), _ = with_effects([fewer], {"fresnel": True})
     assert again.tag_data("M2B0") == recipe.pair().mvis.tag_data("M2B0")
+
+
+def test_the_geometry_goes_along():
+    recipe = replace(PRINT, geometry="exact")
+    full, fewer = recipe.pair(), recipe.pair(["shadowing"])
+    assert recipe_of_profiles([full.mid, full.mvis]).geometry == "exact"
+    assert "geometry" not in read_source(PRINT.pair().mvis).recipe
+    (again,), _ = with_effects([fewer.mvis], {"shadowing": True})
+    assert again.tag_data("M2B0") == full.mvis.tag_data("M2B0") != PRINT.pair().mvis.tag_data("M2B0")
+    with pytest.raises(UsageError, match="no geometry is named 'exakt': did you mean 'exact'"):
+        replace(PRINT, geometry="exakt").pair()
 
 
 def test_a_stale_source_switches_nothing():

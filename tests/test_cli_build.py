@@ -109,6 +109,22 @@ def test_fresnel_angle_alpha_is_reciprocal(run, tmp_path):
         assert np.allclose(forth, back, rtol=1e-9) is reciprocal
 
 
+def test_the_exact_geometry_changes_only_what_is_grazed(run, tmp_path):
+    assert run("build", PRIMARIES, "-o", tmp_path, "--geometry", "exact").code == 0
+    device = samples(10)
+    normals = 2 * device[:, -3:].astype(np.float64) - 1
+    light, view = np.array([-0.6, 0, 0.8]), np.array([0.9, 0.1, 0.3])
+    env = environment(light, view)
+    plain, exact = (transform(profiles, env=env)(device) for profiles in (PRIMARIES.parent, tmp_path))
+    cosines = normals @ np.column_stack([light, view / np.linalg.norm(view)])
+    cosines /= np.linalg.norm(normals, axis=1, keepdims=True)
+    grazed = cosines.min(axis=1) < 1 / 16
+    assert np.array_equal(plain[~grazed], exact[~grazed])
+    assert not np.array_equal(plain[grazed], exact[grazed])
+    # What is left of the plain one's errors at random is small.
+    np.testing.assert_allclose(plain, exact, rtol=1e-3)
+
+
 @pytest.mark.parametrize(
     ("primaries", "options", "code", "message"),
     [

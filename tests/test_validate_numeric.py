@@ -73,6 +73,14 @@ def test_models_pass_with_all_effects_and_without_each(model):
         assert numeric(pair.mid) == [], left_out
 
 
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("left_out", [None, "relief", "specular", "shadowing"])
+def test_the_exact_geometry_passes(model, left_out):
+    if left_out is None or left_out in build_pair(random_primaries(model)).effects:
+        without = [left_out] if left_out else []
+        assert numeric(build_pair(random_primaries(model), without=without, geometry="exact").mvis) == []
+
+
 @pytest.mark.parametrize("model", ["brdf1", "brdf2"])
 def test_the_reciprocal_fresnel_angle_passes(model):
     assert numeric(build_pair(random_primaries(model), fresnel_angle="alpha").mvis) == []

@@ -164,6 +164,28 @@ def test_nan_is_followed_where_there_are_gaps_alone():
     assert "result = n3 ? 0.0 : v3;" in body
 
 
+def test_a_minimum_where_nan_may_be_has_one_condition():
+    """Shaders with conditions in conditions took drivers ten times as long to compile."""
+    graph = Graph(dtype=np.float32)
+    a, b = graph.input(0), graph.input(1)
+    graph.outputs = (graph.apply("vmin", a, b), graph.apply("vmax", b, a))
+    body = body_of(graph, gaps=[0, 1])
+    assert body.count("?") == 4  # two of them where the outputs are assigned
+    assert "(!(n0 || n1) && v0 < v1 ? v0 : v1)" in body
+    assert "(!(n1 || n0) && v1 > v0 ? v1 : v0)" in body
+
+
+def test_digits_that_nobody_sees_are_not_cut_off():
+    primaries = read_primaries(PROFILES / "landscape" / "primaries.json")
+    plain, exact = (build_pair(primaries, geometry=geometry) for geometry in ("plain", "exact"))
+    counts = []
+    for pair in (plain, exact):
+        chain = whole_chain([pair.mid, pair.mvis], None, "device", {})
+        counts.append(sum(make_programs(chain).whole.nodes.values()))
+        assert "3.072e+03" not in make_programs(chain).whole.body
+    assert counts[0] < counts[1] < 1.5 * counts[0]
+
+
 def test_functions_come_with_those_that_they_call():
     text = functions_for("float v = sine(a);")
     assert text.index("float wave(") < text.index("float sine(")

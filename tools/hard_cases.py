@@ -1,6 +1,6 @@
 """How models and colour MIDs stand hard cases, in every back end and number type, on millions of samples.
 
-    python tools/hard_cases.py [--samples 10000000] [--seed 1] [-o docs]
+    python tools/hard_cases.py [--samples 20000000] [--seed 1] [-o docs]
 
 The cases are those of tests/hard_examples.py.  Writes hard_cases.md, tables, and hard_cases.png, an error
 map; ends with 1 where a result is not finite or float32 breaks a promise.
@@ -343,7 +343,7 @@ def draw(maps: Mapping[str, ErrorMap], path: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--samples", type=int, default=10_000_000)
+    parser.add_argument("--samples", type=int, default=20_000_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "docs")
     arguments = parser.parse_args()

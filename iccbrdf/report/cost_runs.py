@@ -81,6 +81,8 @@ def _linked(way: Way, scene: CostScene, plan: Callable[[float], ScenePlan]) -> R
             names, columns = _roughness_columns(names, way.model)
     if way.interpolation is not None:
         recipe = replace(recipe, interpolation=way.interpolation)
+    if way.geometry is not None:
+        recipe = replace(recipe, geometry=way.geometry)
     mid, mvis = scene.mid, scene.pair.mvis
     if way.tolerance is not None:
         found = plan(way.tolerance)

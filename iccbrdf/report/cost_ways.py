@@ -49,6 +49,8 @@ class Way:
     """Another model, with the parameters at hand."""
     literal: bool = False
     """Whether the MVIS computes the formulas as printed."""
+    geometry: str | None = None
+    """Another geometry than the one that was asked for."""
     output: Output = "float32"
     reduction: int = 1
     """The parameters are those of an image with sides so much shorter, interpolated between its pixels."""
@@ -77,6 +79,10 @@ class Way:
             return f"iccbrdf build PRIMARIES -o DIR{options}{used}"
         for others, advice in (
             (Way(self.name, self.axis, dtype="float64"), "iccbrdf apply --double"),
+            (
+                Way(self.name, self.axis, geometry=self.geometry),
+                f"iccbrdf build PRIMARIES -o DIR --geometry {self.geometry}",
+            ),
             (Way(self.name, self.axis, by_tile=True), "iccbrdf apply --effects auto"),
             (Way(self.name, self.axis, output="16-bit XYZ"), "iccbrdf apply -o xyz.tif --dtype uint16"),
             (Way(self.name, self.axis, output="16-bit sRGB"), "iccbrdf apply -o proof.png --depth 16"),
@@ -115,6 +121,8 @@ def ways(
         model = OTHER_ROUGHNESS[recipe.primaries.model]
         found.append(Way(model.upper(), "model", model=model))
     found.append(Way("literal formulas", "formulas", literal=True))
+    other = "plain" if recipe.geometry == "exact" else "exact"
+    found.append(Way(f"{other} geometry", "formulas", geometry=other))
     outputs: tuple[Output, ...] = ("16-bit XYZ", "16-bit sRGB", "8-bit sRGB")
     found += [Way(output, "output", output=output) for output in outputs]
     found += [Way(f"parameters at 1/{n}", "resolution", reduction=n) for n in reductions]
