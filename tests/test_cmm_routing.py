@@ -13,6 +13,7 @@ from cmm_examples import (
     reference,
     scaled,
 )
+from conftest import ROOT
 
 import iccbrdf
 from iccbrdf.errors import (
@@ -326,6 +327,8 @@ def test_a_program_cannot_spare_channels():
         iccbrdf.link([mixing], channels=["1"])
     with pytest.raises(LinkError, match=r"channel 'c' is missing, which mvis.icc needs"):
         iccbrdf.link([mvis("abc")], channels=["a", "b"])
+    with pytest.raises(LinkError, match=r"channels n\.x, n\.y, n\.z are missing.*--normals, --height"):
+        iccbrdf.link([ROOT / "profiles" / "fogra39_gloss" / "colour-mid.icc"], channels=["X", "Y", "Z"])
 
 
 def test_real_samples_enter_behind_the_decoding():

@@ -65,8 +65,10 @@ def _narrowed(stage: Stage, kept: list[str]) -> Stage:
     own, elements = stage.source.names, stage.process.elements
     decoding = decoding_of(elements[0]) if elements else _plain(tuple(range(len(own))))
     if decoding is None or len(elements) > 1 or stage.destination.kind != "mcs":
-        missing = next(name for name in own if name not in kept)
-        raise LinkError(f"channel {missing!r} is missing, which {stage.profile.source} needs")
+        missing = [name for name in own if name not in kept]
+        which = f"channel {missing[0]!r} is" if len(missing) == 1 else f"channels {', '.join(missing)} are"
+        hint = "; a map of normals or heights gives them (--normals, --height)" if "n.z" in missing else ""
+        raise LinkError(f"{which} missing, which {stage.profile.source} needs{hint}")
     rows = [row for row, source in enumerate(decoding.sources) if own[source] in kept]
     narrow = Decoding(
         tuple(kept.index(own[decoding.sources[row]]) for row in rows),
