@@ -22,7 +22,7 @@ from iccbrdf.calc.schedule import schedule
 from iccbrdf.errors import InputError, UnsupportedError, UsageError
 from iccbrdf.images import Block, create_tiff, open_tiff
 from iccbrdf.viewer import Start, make_display, make_page, read_folder, read_print
-from iccbrdf.viewer.chain import defaults, graphs, whole_chain
+from iccbrdf.viewer.chain import defaults, digits_kept, graphs, whole_chain
 from iccbrdf.viewer.cost import cost
 from iccbrdf.viewer.glsl import FUNCTIONS, function_body, functions_for, literal
 from iccbrdf.viewer.image import NOT_FINITE, layers, reduced
@@ -184,6 +184,11 @@ def test_digits_that_nobody_sees_are_not_cut_off():
         counts.append(sum(make_programs(chain).whole.nodes.values()))
         assert "3.072e+03" not in make_programs(chain).whole.body
     assert counts[0] < counts[1] < 1.5 * counts[0]
+    graph = Graph(dtype=np.float32)
+    x = graph.input(0)
+    cut = {c: graph.apply("sub", graph.apply("add", x, graph.const(c)), graph.const(c)) for c in (3.0, 2**23)}
+    assert digits_kept(graph, cut[3.0]) is x
+    assert digits_kept(graph, cut[2**23]) is None  # that is how programs round to whole numbers
 
 
 def test_functions_come_with_those_that_they_call():

@@ -227,8 +227,12 @@ def nothing_of(graph: Graph, node: Node) -> Node | None:
     return None
 
 
+MOST_CUT_OFF = 4096.0
+"""In float32 x + 4096 loses what is below 2^-12 of x, which nobody sees; 2^23 would make whole numbers."""
+
+
 def digits_kept(graph: Graph, node: Node) -> Node | None:
-    """(x + y) - y is x, x - x is 0: how programs cut digits off, which drivers of GPUs do not promise to do.
+    """(x + c) - c is x, x - x is 0: how programs cut digits off, which drivers of GPUs do not promise to do.
 
     Nobody sees what they gain by it near the horizon, and shaders with it take long to compile.
     """
@@ -237,7 +241,10 @@ def digits_kept(graph: Graph, node: Node) -> Node | None:
     left, right = node.arguments
     if left is right:
         return graph.number(0)
-    return left.arguments[0] if left.op == "add" and left.arguments[1] is right else None
+    cut = uniform(right)
+    if cut is None or abs(cut) > MOST_CUT_OFF or left.op != "add" or uniform(left.arguments[1]) != cut:
+        return None
+    return left.arguments[0]
 
 
 _PASSES = (*EXACT_PASSES, ("finite numbers", (neutral, nothing_of, digits_kept)))
