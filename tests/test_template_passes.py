@@ -5,7 +5,9 @@ import math
 import pytest
 
 from iccbrdf.calc.graph import Graph, GraphError, Node, check
+from iccbrdf.calc.lower import Settings, lower
 from iccbrdf.calc.passes import optimise, rewrite
+from iccbrdf.calc.source import parse
 
 
 def optimised(build):
@@ -170,3 +172,12 @@ def test_a_rewriting_is_verified():
     foreign = Graph().input(0, 3)
     with pytest.raises(GraphError):
         rewrite(graph, [lambda new, node: foreign if node.op == "neg" else None])
+
+
+def test_of_a_condition_that_the_build_knows_only_the_side_that_it_takes_is_made():
+    output = "output X = if p == 2 and 1 < 2 { a } else { total k = 1 to 999 { a^k } }"
+    template = parse(f"model t\nconstant p = 2\ninput a\n{output}", "t.calc")
+    graph = lower([template], Settings()).graph
+    assert graph.outputs[0].op == "input"
+    assert len(graph.nodes) < 20
+    assert len(lower([template], Settings(constants={"p": 1})).graph.nodes) > 900

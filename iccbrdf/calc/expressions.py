@@ -246,6 +246,9 @@ class Expressions:
             raise conditional.condition.place.error(
                 f"the condition has {condition.width} components, expected 1"
             )
+        known = self._folded(condition)
+        if known is not None:
+            return self.value(conditional.then if known[0] >= 0.5 else conditional.otherwise, names)
         sides = [self.value(conditional.then, names), self.value(conditional.otherwise, names)]
         return self._graph.add("select", [condition, *self._alike(sides, conditional.place, "if")])
 

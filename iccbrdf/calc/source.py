@@ -21,10 +21,11 @@ documentation, `#` starts a comment, a newline ends a statement except inside pa
 
 Operators by precedence: `or`, `and`, `not`, comparisons, `+ -`, `* / @`, sign, `^`.  `(a, b, c)` is a vector,
 `v.x`, `v.Y` and `v[2]` are components, `v[a:b]` those from a up to, but without b.  `if` is an expression
-whose blocks are `let` statements and a value; `total k = 1 to 3 { ... }` adds up the block's values for each
-k.  Of a table of rows, `colours.X` is a column, `colours[0]` a row, and `w @ colours` the sum of its rows,
-each times its component of w.  Indices and the bounds of `total` are known when the profile is built.
-The functions are listed in expressions.py.
+whose blocks are `let` statements and a value; one that is decided when the profile is built is no more than
+the side that it takes.  `total k = 1 to 3 { ... }` adds up the block's values for each k.  Of a table of
+rows, `colours.X` is a column, `colours[0]` a row, and `w @ colours` the sum of its rows, each times its
+component of w.  Indices and the bounds of `total` are known when the profile is built.  The functions are
+listed in expressions.py.
 """
 
 from __future__ import annotations
