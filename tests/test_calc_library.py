@@ -50,7 +50,8 @@ def decimals(vector):
 
 def expected(normals, light, view):
     """As `geometry`, from forty digits rounded to float64."""
-    with localcontext(prec=40):
+    with localcontext() as context:
+        context.prec = 40
         i, v = decimals(light), decimals(view)
         h = [a + b for a, b in zip(i, v, strict=True)]
         rows = []
